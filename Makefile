@@ -11,7 +11,7 @@ VENV_BENCHMARL := .venv-benchmarl
 STYLE := $(RUN) ruff check . && $(RUN) ruff format --check . && $(VENV)/bin/lint-imports --no-cache
 WARM := $(RUN) entropy_explore_env.warm --processes 1
 
-.PHONY: help demo new-user docs docs-links test test-long boundscheck test-rllib test-benchmarl lint bench \
+.PHONY: help demo new-user docs docs-links test test-long boundscheck test-rllib test-benchmarl lint bench policy \
 	reliability night reproduce clean
 .NOTPARALLEL:
 
@@ -28,6 +28,7 @@ help:
 	@echo "make test-benchmarl   the tutorial with BenchMARL"
 	@echo "make lint         ruff, pyright and the contracts of imports"
 	@echo "make bench        speed against peers"
+	@echo "make policy       searches weights of the planner's features: one to three hours of two processors"
 	@echo "make reliability  all proofs, into docs/results/reliability.md: many hours"
 	@echo "make night        some minutes of each proof, other cases every night"
 	@echo "make reproduce    the experiments of the five papers, into docs/results: many hours"
@@ -76,6 +77,10 @@ lint: $(STAMP)dev
 
 bench: $(STAMP)training $(STAMP)bench
 	$(RUN) benchmarks.speed
+
+# A stopped search goes on; what it finds is runs/weights/weights.json.
+policy: $(STAMP)training
+	$(RUN) training.search --tasks office:1 office:3 hybrid:1 --rounds 8 --pairs 30 --out runs/weights
 
 reliability: $(STAMP)dev
 	$(RUN) benchmarks.proofs --full --out docs/results/reliability.md

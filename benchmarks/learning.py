@@ -10,27 +10,23 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from benchmarks.rows import Effort, Goal, Row, alone, compared
 from entropy_explore_env.errors import MissingExtraError
 
 THREADS = (1, 2)
-_FULL_ROUNDS = 9
-"""An effort of so many long rounds or more is a full one."""
 
 
-@dataclass(frozen=True)
-class Round:
-    """What one rollout and what is learned from it took.
+class Round(NamedTuple):
+    """What one rollout and the update of the networks took.
 
     Attributes:
         steps: Robot-steps.
-        environment_s: Stepping the rows: sensing, fusing, sharing, observing, and telling of it.
+        environment_s: Stepping the missions: sensing, fusing, sharing, observing.
         choosing_s: The policy's choices.
-        collecting_s: All of the rollout: both, and keeping what came of it.
+        collecting_s: The rollout: both, and keeping what came of it.
         learning_s: Updating the networks.
     """
 
@@ -121,28 +117,24 @@ def learning_rounds(
 
 def learning_rows(effort: Effort, words: tuple[str, ...] = ()) -> list[Row]:
     """Robot-steps a second of the loop and of collecting, and the parts of the loop's time."""
-    rounds = 8 if effort.long_rounds >= _FULL_ROUNDS else 2
-    found = learning_rounds(THREADS, rounds, words)
+    found = learning_rounds(THREADS, 8 if effort.large else 2, words)
     whole = {threads: [each.steps / each.whole_s for each in own] for threads, own in found.items()}
     collecting = {threads: [each.steps / each.collecting_s for each in own] for threads, own in found.items()}
-    team, unit, two = "64 missions × 3 robots", "robot-steps/s", found[THREADS[-1]]
-    loop, rollouts = f"PPO, {team}", f"PPO collecting, {team}"
-    return [
-        alone(f"{rollouts}, 1 thread", collecting[1], unit),
-        compared(f"{rollouts}, 2 threads", "1 thread", collecting[2], collecting[1], unit),
-        alone(f"{loop}, 1 thread", whole[1], unit),
-        compared(f"{loop}, 2 threads", "1 thread", whole[2], whole[1], unit),
-        alone(f"{loop}, 2 threads", whole[2], unit, Goal("≥", 12_000, unit)),
-        alone("of that the environment", [_share(r.environment_s, r) for r in two], "%", Goal("≤", 50, "%")),
-        alone("of that the policy's choices", [_share(r.choosing_s, r) for r in two], "%"),
-        alone("of that learning", [_share(r.learning_s, r) for r in two], "%"),
-        alone(
-            "of that keeping the rollout",
-            [_share(r.collecting_s - r.environment_s - r.choosing_s, r) for r in two],
-            "%",
-        ),
-    ]
-
-
-def _share(part_s: float, whole: Round) -> float:
-    return 100.0 * part_s / whole.whole_s
+    unit, rows = "robot-steps/s", list[Row]()
+    for job, rates in (("PPO collecting", collecting), ("PPO", whole)):
+        job = f"{job}, 64 missions × 3 robots"
+        rows.append(alone(f"{job}, 1 thread", rates[1], unit))
+        rows.append(compared(f"{job}, 2 threads", "1 thread", rates[2], rates[1], unit))
+    rows.append(alone("PPO, 64 missions × 3 robots, 2 threads", whole[2], unit, Goal("≥", 12_000, unit)))
+    shares = {
+        "the environment": [each.environment_s / each.whole_s for each in found[2]],
+        "the policy's choices": [each.choosing_s / each.whole_s for each in found[2]],
+        "learning": [each.learning_s / each.whole_s for each in found[2]],
+        "keeping the rollout": [
+            (each.collecting_s - each.environment_s - each.choosing_s) / each.whole_s for each in found[2]
+        ],
+    }
+    goals = {"the environment": Goal("≤", 50, "%")}
+    for part, share in shares.items():
+        rows.append(alone(f"of that {part}", [100.0 * each for each in share], "%", goals.get(part)))
+    return rows

@@ -7,14 +7,11 @@ is the field of traversal costs, or the belief, itself.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from baselines.papers.bhattacharya.simulation.belief import Sensor
-from baselines.papers.bhattacharya.simulation.team import Rules, Simulation
 from baselines.papers.bhattacharya.timing import cost_graph
 from benchmarks.rows import Effort, Goal, Row, alone, compared, interleave, timed
 from entropy_explore_env.belief.paths.geodesic_cells import (
@@ -89,28 +86,23 @@ def noise(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
     return np.random.default_rng(seed).uniform(0.05, 1.0, shape).astype(np.float32)
 
 
-@dataclass(frozen=True)
 class Search:
-    """Our side: a search on a belief that is sure of everything."""
+    """Our side: a search on a belief (X, Y, 1) that is sure of everything."""
 
-    covered: np.ndarray
-    body_radius: float = 0.0
-
-    def __post_init__(self) -> None:
+    def __init__(self, covered: np.ndarray, body_radius: float = 0.0) -> None:
         """Make room."""
-        belief = self.covered.astype(np.float32), np.full(self.covered.shape, _KNOWN, np.float32)
-        lattice = new_lattice(self.covered.shape, self.body_radius)
-        parts = new_search(self.covered.size), lattice, belief_costs(*belief, _PRIOR)
-        object.__setattr__(self, "_parts", parts)
+        belief = covered.astype(np.float32), np.full(covered.shape, _KNOWN, np.float32)
+        self._lattice = new_lattice(covered.shape, body_radius)
+        self._search, self._costs = new_search(covered.size), belief_costs(*belief, _PRIOR)
 
     def cost(self, start: int, goal: int) -> float:
         """Cost of a path."""
         sources = np.array([start], np.int32)
-        return search_paths(*self._parts, sources, goal, math.inf)  # type: ignore[attr-defined]
+        return search_paths(self._search, self._lattice, self._costs, sources, goal, math.inf)
 
 
 def planning_rows(effort: Effort) -> list[Row]:
-    """Voronoi cells of four sources beside SciPy, an iteration of coverage, and a plan across a floor."""
+    """Voronoi cells of four sources beside SciPy, and a plan across a floor."""
     maps = {
         "boxes": traversal_costs(cluttered(MAP, _MAP_SHARE)),
         "rooms": traversal_costs(rooms(MAP)),
@@ -118,7 +110,7 @@ def planning_rows(effort: Effort) -> list[Row]:
         "white-noise costs": noise(MAP),
     }
     rows = [voronoi_row(name, costs, effort) for name, costs in maps.items()]
-    return [*rows, iteration_row(MAP, effort), crossing_row(FLOOR, effort)]
+    return [*rows, crossing_row(FLOOR, effort)]
 
 
 def traversal_costs(covered: np.ndarray) -> np.ndarray:
@@ -162,27 +154,6 @@ def check_tessellation(ours: Tessellation, graph: csr_matrix, sources: np.ndarra
     first = (each[:, reached] <= least[reached] * (1.0 + 1e-9)).argmax(axis=0)
     if not np.array_equal(cells[reached], first):
         raise RuntimeError("our cells are not those of the first nearest source")
-
-
-def iteration_row(shape: tuple[int, int, int], effort: Effort) -> Row:
-    """Milliseconds of the cells and targets of four robots that explore (the paper: 1.7 s)."""
-    covered = cluttered(shape, _MAP_SHARE)
-    starts = np.flatnonzero(~covered)[: 40 * SOURCES : 40]
-    simulation = Simulation(covered, starts.tolist(), Rules(sensor=Sensor(100.0)))
-    for _ in range(3):
-        simulation.step(functional=False)
-    planner, places = simulation.planners[0], simulation.places
-
-    def iterate() -> None:
-        planner.belief.version += 1  # as after a scan
-        planner.update(places)
-        for target in planner.targets:
-            planner.path_to(int(target))
-
-    iterate()
-    taken = [timed(iterate).cpu_s for _ in range(effort.long_rounds)]
-    job = f"cells, targets and paths of {SOURCES} exploring robots, {shape[0]} × {shape[1]}"
-    return alone(job, [1e3 * cpu_s for cpu_s in taken], "ms", Goal("≤", 1700.0 / 25.0, "ms"))
 
 
 def crossing_row(shape: tuple[int, int, int], effort: Effort) -> Row:

@@ -1,9 +1,8 @@
-"""A row of the speed table: what we do, what a peer does, and the ratio that is to be reached.
+"""Rows of the speed table: what we do, what a peer does, and the ratio that is to be reached.
 
-Other work on the machine slows both down. So each job and its peer are measured in turns, round by
-round, and the ratio is the median of the rounds' ratios, not the ratio of the medians. What runs on
-one thread is timed by that thread's processor time, which does not run while others have the
-processor; two threads and fresh processes are timed by the wall clock.
+Other work on the machine slows both down. So each job and its peer are measured in turns, round by round, and
+the ratio is the median of the rounds' ratios. One thread is timed by its processor time; two threads and
+fresh processes are timed by the wall clock.
 """
 
 from __future__ import annotations
@@ -46,24 +45,22 @@ class Effort:
         rounds: Rounds of jobs that take less than a second.
         long_rounds: Rounds of jobs that may take seconds.
         steps: Steps of an environment in a round.
-        batch_steps: The same for vector environments, if that many missions need no more.
-        batches: Missions E of the vector environments.
-        starts: Fresh processes, with everything cached.
-        cold_starts: Fresh processes of two versions, with nothing cached.
+        missions: Missions E of the vector environments.
+        starts: Fresh processes, of each version where there are two.
+        large: Whether what takes minutes or gigabytes is measured, too.
     """
 
     scans: int = 400
     rounds: int = 21
     long_rounds: int = 9
     steps: int = 600
-    batch_steps: int = 40
-    batches: tuple[int, ...] = (1, 16, 64, 256)
+    missions: tuple[int, ...] = (1, 16, 64, 256)
     starts: int = 5
-    cold_starts: int = 3
+    large: bool = True
 
 
 FULL = Effort()
-QUICK = Effort(scans=200, rounds=7, long_rounds=3, steps=200, batch_steps=10, starts=1, cold_starts=1)
+QUICK = Effort(scans=200, rounds=7, long_rounds=3, steps=200, starts=1, large=False)
 
 
 @dataclass(frozen=True)
@@ -99,11 +96,7 @@ class Row:
 
 
 def interleave(jobs: Mapping[str, Job], rounds: int) -> dict[str, list[Taken]]:
-    """Let the jobs take turns: A B A B.
-
-    Returns:
-        For each job what it took in every round.
-    """
+    """Let the jobs take turns, A B A B; returns what each took in every round."""
     measured: dict[str, list[Taken]] = {name: [] for name in jobs}
     for number in range(rounds):
         for name, job in jobs.items():
@@ -115,22 +108,14 @@ def compared(
     job: str, peer: str, ours: Sequence[float], theirs: Sequence[float], unit: str, goal: Goal | None = None
 ) -> Row:
     """The row of a job beside a peer; the goal is about the ratio ours/theirs."""
-    ratio = statistics.median(a / b for a, b in zip(ours, theirs, strict=True))
-    holds = None if goal is None else goal.holds(ratio)
-    return Row(
-        job,
-        peer,
-        float(statistics.median(ours)),
-        float(statistics.median(theirs)),
-        unit,
-        float(ratio),
-        None if goal is None else goal.text,
-        holds,
-    )
+    ratio = float(statistics.median(a / b for a, b in zip(ours, theirs, strict=True)))
+    medians = float(statistics.median(ours)), float(statistics.median(theirs))
+    text, holds = (None, None) if goal is None else (goal.text, goal.holds(ratio))
+    return Row(job, peer, *medians, unit, ratio, text, holds)
 
 
 def alone(job: str, values: Iterable[float], unit: str, goal: Goal | None = None) -> Row:
     """The row of a job without a peer; the goal is about the median itself."""
     value = float(statistics.median(values))
-    holds = None if goal is None else goal.holds(value)
-    return Row(job, None, value, None, unit, None, None if goal is None else goal.text, holds)
+    text, holds = (None, None) if goal is None else (goal.text, goal.holds(value))
+    return Row(job, None, value, None, unit, None, text, holds)

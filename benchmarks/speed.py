@@ -1,7 +1,7 @@
 """Our speed beside peers, in one process and on one thread unless said: `python -m benchmarks.speed`.
 
-Each job and its peer take turns; every figure is a median over the rounds, and every ratio the
-median of the rounds' ratios. Needs the extras `bench` and `training`.
+Each job and its peer take turns; every figure is a median over the rounds, and every ratio the median of the
+rounds' ratios. Needs the extras `bench`, `episodes` and `training`.
 """
 
 from __future__ import annotations
@@ -18,50 +18,37 @@ from typing import Any
 
 from baselines.cli.arguments import parse, print_json, run_command
 from baselines.experiments.machine import processor
-from benchmarks.deciding import deciding_rows, plan_rows
-from benchmarks.drifting import drifting_rows
-from benchmarks.exploring import exploring_rows, mission_row
+from baselines.experiments.tables import markdown_table
+from benchmarks.deciding import deciding_rows, mission_rows, plan_rows
 from benchmarks.fusion import fusion_rows
 from benchmarks.learning import learning_rows
-from benchmarks.peers import load_octomap, load_spread
+from benchmarks.peers import load_peers
 from benchmarks.planning import planning_rows
 from benchmarks.rows import FULL, QUICK, Effort, Row
 from benchmarks.startup import startup_rows
-from benchmarks.stepping import profile_rows, spread_rows, vector_rows
+from benchmarks.stepping import size_rows, step_rows, vector_rows
 from benchmarks.summaries import summary_rows
-from benchmarks.world_size import size_rows
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.worlds.load import load_world
 from entropy_explore_env.writing import write_atomically
 
 GOAL_MISSED = 1
-JOBS: tuple[tuple[str, Callable[[Effort], list[Row]]], ...] = (
-    ("fusion beside octomap-python and the floor", fusion_rows),
-    ("ParallelEnv beside mpe2 simple_spread", spread_rows),
-    ("VectorEnv beside the ParallelEnv, on one and two threads", vector_rows),
-    ("where a step's time goes", profile_rows),
-    ("robots that drift", drifting_rows),
-    ("summaries of maps", summary_rows),
-    ("shortest paths beside SciPy", planning_rows),
-    ("decisions of strategies", deciding_rows),
-    ("learning", learning_rows),
-    ("exploring plans", exploring_rows),
-    ("steps in worlds of different sizes", size_rows),
-    ("first steps of fresh processes", startup_rows),
-)
-"""What is measured, in this order, and what people read while they wait."""
-
+JOBS: dict[str, Callable[[Effort], list[Row]]] = {
+    "fusion beside octomap-python and the floor": fusion_rows,
+    "ParallelEnv beside mpe2 simple_spread": step_rows,
+    "VectorEnv beside the ParallelEnv, on one and two threads": vector_rows,
+    "steps in worlds of different sizes": size_rows,
+    "summaries of maps": summary_rows,
+    "shortest paths beside SciPy": planning_rows,
+    "decisions of strategies": deciding_rows,
+    "missions, a dense scanner, and kept episodes": mission_rows,
+    "learning": learning_rows,
+    "first steps of fresh processes": startup_rows,
+}
+"""Title → what is measured, in this order."""
+COLUMNS = ("job", "ours", "peer", "theirs", "ratio", "goal", "holds")
 _BUSY = 0.5
-_PACKAGES = (
-    "numpy",
-    "numba",
-    "octomap-python",
-    "mpe2",
-    "pettingzoo",
-    "gymnasium",
-    "torch",
-    "stable-baselines3",
-)
+_PACKAGES = "numpy numba octomap-python mpe2 pettingzoo gymnasium torch stable-baselines3".split()
 
 
 @dataclass(frozen=True)
@@ -71,13 +58,13 @@ class Args:
     json: bool = False
     """Print one JSON object and nothing else."""
     quick: bool = False
-    """Fewer rounds: less than a minute instead of a few."""
+    """Fewer rounds: some minutes in all."""
     only: str | None = None
     """Measure no more than what this word is in the title of, such as learning."""
     strict: bool = False
     """Exit with 1 if a goal does not hold."""
     plan: Path | None = None
-    """A plan's file, such as warehouse.yaml, for three robots to explore as well."""
+    """A plan's file, such as warehouse.yaml, to explore as well."""
     before: Path | None = None
     """The checkout of another version, for its first step beside ours; it runs with the same Python."""
     out: Path | None = None
@@ -87,26 +74,17 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command; the exit code."""
     args = parse(Args, words, description=__doc__)
-    if args.out is not None and (args.out.is_dir() or not _parent_exists(args.out)):
-        raise SettingError("out", str(args.out), "a file in a folder that exists")
-    if args.before is not None and not (args.before / "entropy_explore_env" / "__init__.py").is_file():
-        raise SettingError("before", str(args.before), "a checkout, with the folder entropy_explore_env")
-    plan = None if args.plan is None else load_world(args.plan)
-    jobs = [(title, job) for title, job in JOBS if args.only is None or args.only in title]
-    if not jobs:
-        raise SettingError("only", args.only, "a word of one of: " + "; ".join(title for title, _ in JOBS))
-    load_octomap()
-    load_spread()
-    _warn_if_busy()
+    jobs, plan = checked(args)
+    load_peers()
+    if hasattr(os, "getloadavg") and os.getloadavg()[0] > _BUSY:
+        print("warning: other work runs here, which makes two threads and starts look slow", file=sys.stderr)
     rows: list[Row] = []
-    for number, (title, job) in enumerate(jobs, start=1):
+    for number, (title, job) in enumerate(jobs.items(), start=1):
         print(f"[{number}/{len(jobs)}] {title} …", file=sys.stderr, flush=True)
         effort = QUICK if args.quick else FULL
         rows += startup_rows(effort, args.before) if job is startup_rows else job(effort)
-        if job is exploring_rows and args.plan is not None and plan is not None:
-            rows.append(mission_row(args.plan.stem, plan))
-        if job is deciding_rows and args.plan is not None and plan is not None:
-            rows += plan_rows(args.plan.stem, str(args.plan), plan.grid, effort.steps)
+        if job is deciding_rows and args.plan is not None:
+            rows += plan_rows(args.plan.stem, str(args.plan), plan, effort)
     about = {**machine(), "command": " ".join(["python -m benchmarks.speed", *words])}
     if args.out is not None:
         write_atomically(args.out, markdown(about, rows, args.only))
@@ -117,14 +95,20 @@ def main(words: Sequence[str]) -> int:
     return GOAL_MISSED if args.strict and any(row.holds is False for row in rows) else 0
 
 
-def _warn_if_busy() -> None:
-    """Two threads need two processors that nobody else uses."""
-    if hasattr(os, "getloadavg") and os.getloadavg()[0] > _BUSY:
-        print("warning: other work runs here, which makes two threads and starts look slow", file=sys.stderr)
+def checked(args: Args) -> tuple[dict[str, Callable[[Effort], list[Row]]], Any]:
+    """Return the jobs that are asked for and the plan's world, if any.
 
-
-def _parent_exists(path: Path) -> bool:
-    return path.absolute().parent.is_dir()
+    Raises:
+        SettingError: No job has such a title, a file or folder is in the way, or the plan cannot be read.
+    """
+    if args.out is not None and (args.out.is_dir() or not args.out.absolute().parent.is_dir()):
+        raise SettingError("out", str(args.out), "a file in a folder that exists")
+    if args.before is not None and not (args.before / "entropy_explore_env" / "__init__.py").is_file():
+        raise SettingError("before", str(args.before), "a checkout, with the folder entropy_explore_env")
+    jobs = {title: job for title, job in JOBS.items() if args.only is None or args.only in title}
+    if not jobs:
+        raise SettingError("only", args.only, "a word of one of: " + "; ".join(JOBS))
+    return jobs, None if args.plan is None else load_world(args.plan)
 
 
 def machine() -> dict[str, Any]:
@@ -158,9 +142,6 @@ def shown(value: float) -> str:
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
-COLUMNS = ("job", "ours", "peer", "theirs", "ratio", "goal", "holds")
-
-
 def sentence(about: dict[str, Any]) -> str:
     """The machine in one sentence."""
     packages = ", ".join(f"{name} {version}" for name, version in about["packages"].items())
@@ -178,11 +159,8 @@ def print_table(about: dict[str, Any], rows: Sequence[Row]) -> None:
     table = Table(title="Speed beside peers", title_justify="left")
     for name in COLUMNS:
         table.add_column(name, justify="left" if name in ("job", "peer", "holds") else "right")
-    colours = {True: "green", False: "red", None: ""}
     for row in rows:
-        *most, last = cells(row)
-        colour = colours[row.holds]
-        table.add_row(*most, f"[{colour}]{last}[/{colour}]" if colour else last)
+        table.add_row(*cells(row), style="red" if row.holds is False else "")
     console = Console()
     console.print(table)
     console.print(sentence(about), highlight=False)
@@ -190,20 +168,13 @@ def print_table(about: dict[str, Any], rows: Sequence[Row]) -> None:
 
 def markdown(about: dict[str, Any], rows: Sequence[Row], only: str | None = None) -> str:
     """The page for `docs/results/`: table, machine, command; of all jobs, or of those that a word names."""
-    lines = [
-        "# Speed beside peers" + (f": {only}" if only else ""),
-        "",
+    return (
+        f"# Speed beside peers{f': {only}' if only else ''}\n\n"
         f"Made by `{about['command']}`. One process, one thread unless said. Each job and its peer take "
-        "turns; figures are medians over the rounds, ratios are medians of the rounds' ratios.",
-        "",
-        "| " + " | ".join(COLUMNS) + " |",
-        "| --- | ---: | --- | ---: | ---: | ---: | --- |",
-        *("| " + " | ".join(cells(row)) + " |" for row in rows),
-        "",
-        f"Machine: {sentence(about)}",
-        "",
-    ]
-    return "\n".join(lines)
+        "turns; figures are medians over the rounds, ratios are medians of the rounds' ratios.\n\n"
+        f"{markdown_table(COLUMNS, [cells(row) for row in rows])}\n"
+        f"Machine: {sentence(about)}\n"
+    )
 
 
 if __name__ == "__main__":

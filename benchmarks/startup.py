@@ -46,32 +46,29 @@ def startup_rows(effort: Effort, before: Path | None = None) -> list[Row]:
     """
     first_step()
     warm = [first_step() for _ in range(effort.starts)]
-    ours, theirs = [], []
-    for _ in range(1 if before is None else effort.cold_starts):
-        ours.append(_cold_step(_OURS))
-        if before is not None:
-            theirs.append(_cold_step(before))
+    cold, theirs = list[FirstStep](), list[FirstStep]()
+    for _ in range(1 if before is None else effort.starts):
+        for root, found in ((_OURS, cold), (before, theirs)):
+            if root is not None:
+                with tempfile.TemporaryDirectory() as empty:
+                    found.append(first_step(empty, root))
     rows = []
     for starts, how, most_s in (
         (warm, "compiled code cached, no torch", 1.5),
-        (ours, "nothing cached", 12.0),
+        (cold, "nothing cached", 12.0),
     ):
         whole, imports, steps, _ = (list(column) for column in zip(*starts, strict=True))
+        job = f"python start, import, reset, first step, {how}"
         rows += [
-            alone(f"python start, import, reset, first step, {how}", whole, "s", Goal("≤", most_s, "s")),
+            alone(job, whole, "s", Goal("≤", most_s, "s")),
             alone(f"of that the import, {how}", imports, "s"),
             alone(f"of that the first reset and step, {how}", steps, "s"),
         ]
     if before is not None:
         job = "first step of all, nothing compiled, processor time"
-        now, earlier = [start.cpu_s for start in ours], [start.cpu_s for start in theirs]
-        rows.append(compared(job, "version before", now, earlier, "s", Goal("≤", 0.5)))
+        ours_s, theirs_s = [start.cpu_s for start in cold], [start.cpu_s for start in theirs]
+        rows.append(compared(job, "version before", ours_s, theirs_s, "s", Goal("≤", 0.5)))
     return rows
-
-
-def _cold_step(root: Path) -> FirstStep:
-    with tempfile.TemporaryDirectory() as empty:
-        return first_step(empty, root)
 
 
 def first_step(cache: str | None = None, root: Path = _OURS) -> FirstStep:
@@ -84,18 +81,17 @@ def first_step(cache: str | None = None, root: Path = _OURS) -> FirstStep:
     Raises:
         RuntimeError: The process failed; the message is its last line.
     """
-    root = root.resolve()
-    paths = [str(root), *filter(None, [os.environ.get("PYTHONPATH")])]
+    paths = [str(root.resolve()), *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
     if cache is not None:
         environment["NUMBA_CACHE_DIR"] = cache
     done: list[subprocess.CompletedProcess[str]] = []
+    words = [sys.executable, "-c", _FIRST_STEP]
 
     def start() -> None:
-        command = [sys.executable, "-c", _FIRST_STEP]
         done.append(
             subprocess.run(
-                command, cwd=root, env=environment, capture_output=True, text=True, timeout=_TIMEOUT_S
+                words, cwd=root, env=environment, capture_output=True, text=True, timeout=_TIMEOUT_S
             )
         )
 

@@ -6,12 +6,22 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies.rules.nearest_frontier import NearestFrontier
-from benchmarks.deciding import FirstCandidate
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.explorer import PlannedRate
+from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS, find_scenario
+
+
+class FirstCandidate:
+    """Chooses the first of the candidates that the planner proposes to a policy, which is its own choice."""
+
+    def reset(self, scenario, rng):
+        self._proposer = ViewProposer(with_settings(scenario, {"action": {"kind": "candidates"}}), rng)
+
+    def choose(self, view):
+        return self._proposer.propose(view)[0].copy()
 
 
 def figures_of(strategy, scenario=ROOM, seed=0, **settings):

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from types import MappingProxyType, ModuleType
 
-from baselines.strategies.loading import entry_points, is_reference, make_referenced, module_of
+from baselines.strategies.loading import entry_points, make_referenced, module_of
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.table import ALIASES, CLIFF_STRATEGIES, STRATEGIES
 from entropy_explore_env.command import home_path
@@ -30,7 +30,7 @@ _GONE = MappingProxyType(
 
 
 def make_strategy(name: str) -> Strategy:
-    """A new strategy.
+    """Make a new strategy.
 
     Args:
         name: One of STRATEGIES or ALIASES; `pretrained:NAME`, a policy that comes with the project; the
@@ -64,17 +64,17 @@ def scripted_maker(name: str) -> Callable[[], Strategy] | None:
 
 
 def recommended(scenario: str) -> str:
-    """The name of the strategy that we recommend in a named scenario."""
+    """Return the name of the strategy that we recommend in a named scenario."""
     return _RECOMMENDED.get(scenario, "best")
 
 
 def resolved(name: str) -> str:
-    """The name that records and tables hold of a strategy that is asked for by this name."""
+    """Return the name that records and tables hold of a strategy that is asked for by this name."""
     return ALIASES.get(name, str(home_path(name)) if name.startswith("~") else name)
 
 
 def strategy_module(name: str) -> str | Path:
-    """The module that defines a scripted strategy, or the file that does.
+    """Return the module that defines a scripted strategy, or the file that does.
 
     Args:
         name: As for `make_strategy`, but for learned policies.
@@ -92,8 +92,8 @@ def strategy_module(name: str) -> str | Path:
 
 
 def _reference(name: str) -> str:
-    """`module:Class` or `file.py:Class` of a strategy from outside the package."""
-    if is_reference(name):
+    """Return `module:Class` or `file.py:Class` of a strategy from outside the package."""
+    if ":" in name:
         return name
     declared = entry_points()
     if name in declared:
@@ -106,12 +106,12 @@ def _reference(name: str) -> str:
 
 
 def is_learned(name: str) -> bool:
-    """Whether a name means a learned policy."""
+    """Return whether a name means a learned policy."""
     return scripted_maker(resolved(name)) is None and (name.startswith(_PRETRAINED) or Path(name).is_dir())
 
 
 def learned_policies() -> ModuleType:
-    """The module that knows learned policies.
+    """Return the module that knows learned policies.
 
     Raises:
         MissingExtraError: What runs them is not installed.

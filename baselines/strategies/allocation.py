@@ -226,7 +226,7 @@ class Round:
         }
 
     def over(self, view: RobotKnowledge) -> bool:
-        """Whether all teammates have scanned at their targets.
+        """Return whether all teammates have scanned at their targets.
 
         A teammate has if it waits, or if it left after the robot arrived, since it had waited for all others
         then. Where robots stop at corners, leaving a corner looks like leaving for a new target. There a

@@ -23,19 +23,12 @@ from entropy_explore_env.planner.frontier_rule import PickRule
 
 ENTRY_POINTS = "entropy_explore_env.strategies"
 """The group in which packages declare strategies."""
-_METHODS = (("reset",), ("choose", "choose_all"))
-"""A strategy has one of the methods of each group."""
 _FORM = "module:Class or path/to/file.py:Class"
 
 
 def entry_points() -> dict[str, str]:
-    """Name → `module:Class` of the strategies that installed packages declare."""
+    """Return name → `module:Class` of the strategies that installed packages declare."""
     return {each.name: each.value for each in importlib.metadata.entry_points(group=ENTRY_POINTS)}
-
-
-def is_reference(name: str) -> bool:
-    """Whether a strategy is named by its class."""
-    return ":" in name
 
 
 def module_of(name: str) -> str | Path:
@@ -45,11 +38,11 @@ def module_of(name: str) -> str | Path:
         name: `module:Class` or `path/to/file.py:Class`.
     """
     source, _ = _split(name)
-    return Path(source).resolve() if _is_file(source) else source
+    return Path(source).resolve() if source.endswith(".py") else source
 
 
 def make_referenced(name: str) -> Strategy:
-    """A new strategy of a class named by its module or file.
+    """Make a new strategy of a class named by its module or file.
 
     Args:
         name: `module:Class` or `path/to/file.py:Class`. A class, or a function without arguments, makes the
@@ -63,10 +56,11 @@ def make_referenced(name: str) -> Strategy:
     module = _load(name, source)
     make = getattr(module, attribute, None)
     if make is None or not callable(make):
-        classes = sorted(_strategies_in(module))
-        known = (
-            f", such as {', '.join(classes)}" if classes else "; it defines no class with reset and choose"
-        )
+        defined = [
+            each for each in vars(module).values() if getattr(each, "__module__", "") == module.__name__
+        ]
+        classes = sorted(each.__name__ for each in defined if isinstance(each, type) and not _missing(each))
+        known = f", such as {', '.join(classes)}" if classes else "; no class there has reset and choose"
         raise SettingError("strategy", name, f"a class in {source}{known} ({attribute} is none)")
     if inspect.isfunction(make) and _takes_one(make):
         return PickRule(make)
@@ -80,20 +74,15 @@ def _split(name: str) -> tuple[str, str]:
     return source, attribute
 
 
-def _is_file(source: str) -> bool:
-    return source.endswith(".py")
-
-
 def _load(name: str, source: str) -> ModuleType:
     """Import the module or the file that defines a strategy."""
-    if _is_file(source):
-        path = Path(source).resolve()
-        if not path.is_file():
-            raise SettingError("strategy", name, f"{_FORM}; there is no file {source}")
-    elif not all(part.isidentifier() for part in source.split(".")):
+    path = Path(source).resolve() if source.endswith(".py") else None
+    if path is not None and not path.is_file():
+        raise SettingError("strategy", name, f"{_FORM}; there is no file {source}")
+    if path is None and not all(part.isidentifier() for part in source.split(".")):
         raise SettingError("strategy", name, f"{_FORM}; {source} is neither a module's name nor a .py file")
     try:
-        return _import_file(path) if _is_file(source) else importlib.import_module(source)
+        return importlib.import_module(source) if path is None else _import_file(path)
     except EntropyExploreError:
         raise
     except ModuleNotFoundError as error:
@@ -134,27 +123,23 @@ def _made(name: str, attribute: str, make: Callable[[], Any]) -> Strategy:
     except Exception as error:
         allowed = f"a class that can be made without arguments; {attribute}() raised {_said(error)}"
         raise SettingError("strategy", name, allowed) from error
-    missing = [group[0] for group in _METHODS if not _has_one_of(strategy, group)]
-    if missing:
+    if missing := _missing(strategy):
         allowed = f"a Strategy, with the methods reset and choose; {' and '.join(missing)} missing"
         raise SettingError("strategy", name, allowed)
     choose = getattr(strategy, "choose", None)
     if choose is not None and "views" in inspect.signature(choose).parameters:
-        allowed = (
-            "a Strategy with choose(view), of one robot; the choice for several at once is choose_all(views)"
-        )
+        allowed = "a Strategy with choose(view), for one robot; choose_all(views) chooses for several at once"
         raise SettingError("strategy", name, allowed)
     return strategy
 
 
-def _strategies_in(module: ModuleType) -> list[str]:
-    """Classes of a module that have the methods of a Strategy."""
+def _missing(thing: object) -> list[str]:
+    """Return which methods of a Strategy a strategy, or its class, has not."""
+    methods = {"reset": ("reset",), "choose": ("choose", "choose_all")}
     return [
         name
-        for name, thing in vars(module).items()
-        if isinstance(thing, type)
-        and thing.__module__ == module.__name__
-        and all(_has_one_of(thing, group) for group in _METHODS)
+        for name, either in methods.items()
+        if not any(callable(getattr(thing, method, None)) for method in either)
     ]
 
 
@@ -164,11 +149,6 @@ def _takes_one(function: Callable[..., Any]) -> bool:
     positional = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
     needed = [each for each in parameters if each.default is each.empty and each.kind in positional]
     return len(needed) == 1
-
-
-def _has_one_of(thing: object, methods: tuple[str, ...]) -> bool:
-    """Whether a strategy, or its class, has one of some methods."""
-    return any(callable(getattr(thing, method, None)) for method in methods)
 
 
 def _said(error: BaseException) -> str:

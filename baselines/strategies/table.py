@@ -18,7 +18,7 @@ from types import MappingProxyType
 from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.rules.assigned_frontier import AssignedFrontier
-from baselines.strategies.rules.cliff import CliffConfig, CliffNextBestView
+from baselines.strategies.rules.cliff import CliffNextBestView
 from baselines.strategies.rules.cliff_raster import CliffRaster
 from baselines.strategies.rules.coordinated_frontier import CoordinatedFrontier
 from baselines.strategies.rules.distance_advantage import DistanceAdvantage
@@ -58,7 +58,6 @@ class Entry:
 
     Attributes:
         name: What `--strategy` takes.
-        family: Where it comes from.
         make: Makes a new strategy.
         line: What it does, with its source.
         suites: Names of the suites whose tables it stands in; variants of a rule stand in none, nor do rules
@@ -66,17 +65,15 @@ class Entry:
     """
 
     name: str
-    family: Family
     make: Callable[[], Strategy]
     line: str
     suites: tuple[str, ...] = ()
 
 
-TABLE: tuple[Entry, ...] = (
-    Entry("random", Family.PAPER, RandomWalk, "any viewpoint within reach, any gaze", _EVERYWHERE),
+_PAPER = (
+    Entry("random", RandomWalk, "any viewpoint within reach, any gaze", _EVERYWHERE),
     Entry(
         "gradient",
-        Family.PAPER,
         GradientStrategy,
         "argmax ‖∇h(l)‖ (1 - μ(l)) over the voxels l within reach, gaze along ∇h; planar robots as "
         "`gradient-plane` (Rocha04, eqs. 32-34)",
@@ -84,14 +81,12 @@ TABLE: tuple[Entry, ...] = (
     ),
     Entry(
         "gradient-plane",
-        Family.PAPER,
         partial(GradientStrategy, motion_plane=True),
         "argmax ρ(l) ‖proj ∇h(l)‖ (1 - μ(l)), proj on the plane of motion, ρ reachability (Rocha04, eqs. "
         "35-40)",
     ),
     Entry(
         "mutual-information",
-        Family.PAPER,
         MutualInformation,
         "argmax ‖∇H(l)‖ λ(l) ρ(l) η(l) - κ ϑ(l), λ = exp(-I/ξ) with I what teammates announced to see there, "
         "η teammates in the view, ϑ distance (RochaMI, eqs. 11-13)",
@@ -99,13 +94,11 @@ TABLE: tuple[Entry, ...] = (
     ),
     Entry(
         "ground-gradient",
-        Family.PAPER,
         partial(MutualInformation, MutualInformationConfig(coordinated=False)),
         "`mutual-information` without teammates: λ = η = 1 (RochaMI)",
     ),
     Entry(
         "voronoi",
-        Family.PAPER,
         VoronoiCoverage,
         "the centroid Σ q φ(q)/Σ φ(q) of the robot's geodesic cell of its own map, whose paths cost "
         "(e(s) + e(t))/2 + η‖s - t‖, e entropy (Bhattacharya, eqs. 6-8)",
@@ -113,13 +106,11 @@ TABLE: tuple[Entry, ...] = (
     ),
     Entry(
         "voronoi-gradient",
-        Family.PAPER,
         partial(VoronoiCoverage, "gradient-search"),
         "the same cells, one step down the coverage functional's gradient (Bhattacharya, eq. 3)",
     ),
     Entry(
         "next-best-view",
-        Family.PAPER,
         NextBestView,
         "argmax (NI - w_d d - w_LE LE)(1 - P_occ) over poses in known free space, NI new information, LE how "
         "much less exactly a drifting robot will know its pose there (Sujan, eq. 23, method (v))",
@@ -127,48 +118,41 @@ TABLE: tuple[Entry, ...] = (
     ),
     Entry(
         "most-unmapped",
-        Family.PAPER,
         MostUnmapped,
         "the pose that shows the largest unmapped region (Sujan, method (iii))",
     ),
     Entry(
         "least-mapped",
-        Family.PAPER,
         LeastMapped,
         "the pose that shows the smallest mapped region (Sujan, method (iv))",
     ),
     Entry(
         "random-known",
-        Family.PAPER,
         RandomKnown,
         "any pose in known free space (Sujan, method (i))",
     ),
     Entry(
         "raster",
-        Family.PAPER,
         Raster,
         "the next place in row order, looking in all directions (Sujan, method (ii))",
     ),
     Entry(
         "raster-fixed-yaw",
-        Family.PAPER,
         partial(Raster, turning=False),
         "the next place in row order, looking in one direction (Sujan, method (ii))",
     ),
     Entry(
         "per-time-visibility",
-        Family.PAPER,
         PerTimeVisibility,
         "argmax V/t over frontier candidates; over terrain V/t (z_f - z_av)^γ z_f^(1-γ); points promised to "
         "n others weigh 1/n (Sawhney)",
         _EVERYWHERE,
     ),
-    Entry(
-        "nearest-frontier", Family.FRONTIER, NearestFrontier, "argmin d(r, v) (Yamauchi 1997)", _EVERYWHERE
-    ),
+)
+_FRONTIER = (
+    Entry("nearest-frontier", NearestFrontier, "argmin d(r, v) (Yamauchi 1997)", _EVERYWHERE),
     Entry(
         "coordinated-frontier",
-        Family.FRONTIER,
         CoordinatedFrontier,
         "argmax U(v) - β d(r, v)/R, U(v) = 1 - Σ max(1 - |v - t|/R, 0) over teammates' targets t, R the "
         "sensor's range (Burgard 2005)",
@@ -176,7 +160,6 @@ TABLE: tuple[Entry, ...] = (
     ),
     Entry(
         "assigned-frontier",
-        Family.FRONTIER,
         AssignedFrontier,
         "the nearest cell of the group of frontier cells that the optimal assignment gives the robot "
         "(Hungarian method)",
@@ -184,7 +167,6 @@ TABLE: tuple[Entry, ...] = (
     ),
     Entry(
         "information-gain",
-        Family.FRONTIER,
         InformationGain,
         "argmax λ log(1 + gain(v)) - d(r, v), gain: unknown voxels that would be seen from v (as compared in "
         "Ericson 2025)",
@@ -192,7 +174,6 @@ TABLE: tuple[Entry, ...] = (
     ),
     Entry(
         "distance-advantage",
-        Family.FRONTIER,
         DistanceAdvantage,
         "argmax mean over u of d(u, v) - d(r, v), u the free cells around the robot (Ericson, Pedro & "
         "Jensfelt 2025)",
@@ -200,21 +181,20 @@ TABLE: tuple[Entry, ...] = (
     ),
     Entry(
         "receding-horizon",
-        Family.FRONTIER,
         RecedingHorizon,
         "first edge of the random tree's branch with the greatest Σ unknown(n) exp(-λ c(n)) (Bircher 2016)",
         _NAMED_SUITES,
     ),
     Entry(
         "tour",
-        Family.FRONTIER,
         Tour,
         "first place of a short open tour through near viewpoints and far regions (after TARE, Cao 2021)",
         _NAMED_SUITES,
     ),
+)
+_OWN = (
     Entry(
         "planned-rate",
-        Family.OWN,
         PlannedRate,
         "argmax of expected bits for their time, over viewpoints nearby and far places on planned paths; "
         "ground robots that explore a plan until all is seen follow short tours through frontier cells",
@@ -222,60 +202,57 @@ TABLE: tuple[Entry, ...] = (
     ),
     Entry(
         "pretrained:plans",
-        Family.OWN,
         partial(PlannedRate, shipped_weights("plans")),
         "`planned-rate` that chooses among 24 candidates by learned weights of 19 features",
         _NAMED_SUITES,
     ),
     Entry(
         "voronoi-nearest",
-        Family.OWN,
         partial(VoronoiCoverage, "nearest"),
         "the nearest uncertain voxel of the robot's geodesic cell",
     ),
+)
+_CLIFF = (
     Entry(
         "cliff-raster-fixed-yaw",
-        Family.CLIFF,
         partial(CliffRaster, turning=False),
         "raster on the plateau, in one direction (Sujan, method 1)",
     ),
     Entry(
         "cliff-raster",
-        Family.CLIFF,
         CliffRaster,
         "raster on the plateau, in all directions (Sujan, method 2)",
     ),
     Entry(
         "cliff-straight-edge",
-        Family.CLIFF,
-        partial(CliffNextBestView, CliffConfig(edge="line", interest_decay=0.0)),
+        partial(CliffNextBestView, "line", interest_decay=0.0),
         "`cliff-polygon-edge` with the edge a straight line (Sujan, method 3)",
     ),
     Entry(
         "cliff-polygon-edge",
-        Family.CLIFF,
-        partial(CliffNextBestView, CliffConfig(interest_decay=0.0)),
+        partial(CliffNextBestView, interest_decay=0.0),
         "`cliff-next-best-view` without the interest function (Sujan, method 4)",
     ),
     Entry(
         "cliff-next-best-view",
-        Family.CLIFF,
         CliffNextBestView,
         "argmax NI - w_d d over poses on the rover's plateau, NI over its elevation map, with the interest "
         "function (Sujan, eqs. 3, 5, 9, method 5)",
     ),
 )
+TABLE = MappingProxyType(
+    {Family.PAPER: _PAPER, Family.FRONTIER: _FRONTIER, Family.OWN: _OWN, Family.CLIFF: _CLIFF}
+)
+"""Family → its strategies."""
 
 
-def _factories(cliff: bool) -> MappingProxyType[str, Callable[[], Strategy]]:
-    return MappingProxyType(
-        {entry.name: entry.make for entry in TABLE if (entry.family is Family.CLIFF) == cliff}
-    )
+def _factories(*families: Family) -> MappingProxyType[str, Callable[[], Strategy]]:
+    return MappingProxyType({entry.name: entry.make for family in families for entry in TABLE[family]})
 
 
-STRATEGIES = _factories(cliff=False)
+STRATEGIES = _factories(Family.PAPER, Family.FRONTIER, Family.OWN)
 """Name → a function that makes the strategy."""
-CLIFF_STRATEGIES = _factories(cliff=True)
+CLIFF_STRATEGIES = _factories(Family.CLIFF)
 """The strategies for rovers above a cliff; the word `all` leaves them out."""
 ALIASES: MappingProxyType[str, str] = MappingProxyType({"best": "planned-rate"})
 """Alias → the name that tables and records hold."""
@@ -287,19 +264,17 @@ def help_text(width: int = 70) -> str:
     Args:
         width: Of a line, in characters.
     """
-    paragraphs = []
-    for family in Family:
-        names = ", ".join(entry.name for entry in TABLE if entry.family is family)
-        paragraphs.append(f"{family.value}: {names}.")
-    filled = [textwrap.fill(each, width, break_on_hyphens=False) for each in paragraphs]
-    return "\n".join(filled)
+    paragraphs = [
+        f"{family.value}: {', '.join(entry.name for entry in entries)}." for family, entries in TABLE.items()
+    ]
+    return "\n".join(textwrap.fill(each, width, break_on_hyphens=False) for each in paragraphs)
 
 
 def suite_names(suite: str) -> tuple[str, ...]:
     """Return the names of the strategies that stand in a suite's table."""
-    return tuple(entry.name for entry in TABLE if suite in entry.suites)
+    return tuple(entry.name for entries in TABLE.values() for entry in entries if suite in entry.suites)
 
 
 def markdown_list(family: Family) -> str:
     """Return a family's strategies as a list in Markdown: name and line."""
-    return "\n".join(f"- `{entry.name}`: {entry.line}" for entry in TABLE if entry.family is family)
+    return "\n".join(f"- `{entry.name}`: {entry.line}" for entry in TABLE[family])

@@ -31,8 +31,9 @@ DEFAULT_SCENARIOS, QUICK_SCENARIOS = "room,room-furnished,lab,office,cave", "roo
 MOST_ROBOTS = 1000
 _IMAGES = (".png", ".pgm", ".ppm", ".pnm", ".jpg", ".jpeg", ".bmp", ".gif")
 _PLANS = (".yaml", ".yml", *_IMAGES)
-_MESHES = (".obj", ".stl", ".glb", ".ply")
-_HEIGHTS = (".tif", ".tiff", ".npz")
+_MESHES = (".obj", ".stl", ".glb", ".dae", ".ply")
+_CLOUDS = (".pcd", ".las", ".laz")
+_HEIGHTS = (".tif", ".tiff", ".npz", ".asc")
 _READ_BY_SOME = {
     "height_m": _PLANS,
     "resolution_m": _IMAGES,
@@ -44,6 +45,9 @@ _READ_BY_SOME = {
     "clearance_m": (*_HEIGHTS, *_MESHES),
     "ceiling_m": _HEIGHTS,
     "hollow": _MESHES,
+    "inside": _MESHES,
+    "scale": (*_MESHES, *_CLOUDS),
+    "up": (*_MESHES, *_CLOUDS),
 }
 """Option of reading → the files that it is for; of several files the others are read without it."""
 

@@ -3,7 +3,7 @@
 A cell is a voxel, or a column of ground. The edge consists of mapped free cells next to unexplored ones; at a
 finer level also of mapped cells that are unexplored themselves. A candidate is a cell that has room and whose
 footprint meets the edge; the one nearest to the middle of its block represents the block. Cells are known by
-number, C order; lengths are in cells.
+number, C order; lengths are in cells. `blocks` is always a Blocks.
 """
 
 from __future__ import annotations
@@ -35,21 +35,20 @@ ROOM = 16
 _ALL_FLAGS = 31
 NONE = -1
 """In place of the number of a cell or voxel: there is none."""
+_NO_COSTS = np.zeros(0)
 
 
 class Blocks(NamedTuple):
     """N cells in B blocks, and the candidate of each block."""
 
     state: np.ndarray
-    """(N,) uint8: UNEXPLORED, UNMAPPED, COVERED."""
+    """(N,) uint8: UNEXPLORED, UNMAPPED, COVERED; kept up to date by others."""
     flags: np.ndarray
     """(N,) uint8: EDGE, CANDIDATE, EXCLUDED, DROPPED, ROOM."""
     candidate: np.ndarray
     """(B,) int32, cell; NONE = the block has no candidate."""
     dirty: np.ndarray
-    """(B,) uint8, whether a block is queued."""
-    queued: np.ndarray
-    """(B,) int32, the blocks that have to be updated."""
+    """(B,) uint8, whether a block has to be updated."""
     size: tuple[int, int, int]
     """Cells along each axis."""
     across: tuple[int, int, int]
@@ -67,25 +66,15 @@ class Blocks(NamedTuple):
 def new_blocks(
     shape: tuple[int, ...], state: np.ndarray, footprint: np.ndarray, layer: int | None, spacing: int
 ) -> Blocks:
-    """Return blocks without a candidate.
-
-    Args:
-        shape: (X, Y, Z) cells.
-        state: (N,) uint8, kept up to date by others.
-        footprint: (F, 3) int64 index offsets.
-        layer: The only one with candidates; None = all.
-        spacing: Cells along the edge of a block.
-    """
+    """Return blocks of `spacing` cells along each axis, without a candidate; see `Blocks`."""
     flat = shape[2] == 1 or layer is not None
     across = (spacing, spacing, int(shape[2]) if flat else spacing)
     blocks = [math.ceil(n / width) for n, width in zip(shape, across, strict=True)]
-    count = math.prod(blocks)
     return Blocks(
         state=state,
-        flags=np.zeros(math.prod(shape), np.uint8),
-        candidate=np.full(count, NONE, np.int32),
-        dirty=np.zeros(count, np.uint8),
-        queued=np.zeros(count, np.int32),
+        flags=np.zeros(len(state), np.uint8),
+        candidate=np.full(math.prod(blocks), NONE, np.int32),
+        dirty=np.zeros(math.prod(blocks), np.uint8),
         size=(int(shape[0]), int(shape[1]), int(shape[2])),
         across=across,
         blocks=(blocks[0], blocks[1], blocks[2]),
@@ -96,37 +85,21 @@ def new_blocks(
 
 
 @lean_kernel
-def queue_around(blocks, cell, radius, count):
-    """Queue the blocks with a cell within `radius` along every axis; return how many are queued."""
+def mark_around(blocks, cell, radius):
+    """Let the blocks with a cell within `radius` along every axis be updated next time."""
     size, across = blocks.size, blocks.across
     x, y, z = grid_index(size, cell)
     for i in range(max(x - radius, 0) // across[0], min(x + radius, size[0] - 1) // across[0] + 1):
         for j in range(max(y - radius, 0) // across[1], min(y + radius, size[1] - 1) // across[1] + 1):
             for k in range(max(z - radius, 0) // across[2], min(z + radius, size[2] - 1) // across[2] + 1):
-                block = flat_index(blocks.blocks, i, j, k)
-                if blocks.dirty[block] == 0:
-                    blocks.dirty[block] = 1
-                    blocks.queued[count] = block
-                    count += 1
-    return count
-
-
-@lean_kernel
-def queue_all_around(blocks, cells, radius):
-    """Queue the blocks around (K,) cells; return how many are queued."""
-    count = 0
-    for cell in cells:
-        count = queue_around(blocks, cell, radius, count)
-    return count
+                blocks.dirty[flat_index(blocks.blocks, i, j, k)] = 1
 
 
 @inlined_kernel
 def block_span(blocks, block):
     """Return the first cell of a block along each axis, and one past its last."""
-    size, across, shape = blocks.size, blocks.across, blocks.blocks
-    k = block % shape[2]
-    j = block // shape[2] % shape[1]
-    i = block // (shape[2] * shape[1])
+    size, across = blocks.size, blocks.across
+    i, j, k = grid_index(blocks.blocks, block)
     low, high = k * across[2], min((k + 1) * across[2], size[2])
     if blocks.layer >= 0:
         low, high = blocks.layer, blocks.layer + 1
@@ -156,56 +129,42 @@ def shares_face(blocks, marks, mask, value, x, y, z):
     return found
 
 
+@inlined_kernel
+def set_flag(blocks, cell, flag, value):
+    """Set or clear a flag of a cell."""
+    blocks.flags[cell] = blocks.flags[cell] & (_ALL_FLAGS - flag) | (flag if value else 0)
+
+
 @lean_kernel
-def mark_edges(blocks, count):
-    """Set EDGE in the first `count` queued blocks."""
-    for place in range(count):
-        low, high = block_span(blocks, blocks.queued[place])
+def mark_edges(blocks):
+    """Set EDGE in the blocks that have to be updated."""
+    state = blocks.state
+    for block in range(len(blocks.dirty)):
+        if blocks.dirty[block] == 0:
+            continue
+        low, high = block_span(blocks, block)
         for x in range(low[0], high[0]):
             for y in range(low[1], high[1]):
                 for z in range(low[2], high[2]):
                     cell = flat_index(blocks.size, x, y, z)
-                    blocks.flags[cell] &= _ALL_FLAGS - EDGE
-                    free = blocks.state[cell] & (UNMAPPED | COVERED) == 0
-                    if free and (
-                        blocks.state[cell] & UNEXPLORED
-                        or shares_face(blocks, blocks.state, UNEXPLORED, UNEXPLORED, x, y, z)
-                    ):
-                        blocks.flags[cell] |= EDGE
-
-
-@inlined_kernel
-def set_room(blocks, cell, room):
-    """Set or clear ROOM."""
-    blocks.flags[cell] &= _ALL_FLAGS - ROOM
-    if room:
-        blocks.flags[cell] |= ROOM
-
-
-@inlined_kernel
-def _from_middle(low, high, x, y, z):
-    """Return the squared distance of a cell from the middle of its block, in half cells."""
-    dx, dy, dz = 2 * x + 1 - low[0] - high[0], 2 * y + 1 - low[1] - high[1], 2 * z + 1 - low[2] - high[2]
-    return dx * dx + dy * dy + dz * dz
+                    edge = state[cell] & (UNMAPPED | COVERED) == 0 and (
+                        state[cell] & UNEXPLORED > 0
+                        or shares_face(blocks, state, UNEXPLORED, UNEXPLORED, x, y, z)
+                    )
+                    set_flag(blocks, cell, EDGE, edge)
 
 
 @lean_kernel
 def choose_candidate(blocks, block):
-    """Set CANDIDATE in a block and choose the block's candidate; return whether that is another one."""
+    """Set CANDIDATE in a block and choose the block's candidate, for which edges and ROOM are known."""
     low, high = block_span(blocks, block)
-    best, nearest, before = NONE, math.inf, blocks.candidate[block]
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
             for z in range(low[2], high[2]):
                 cell = flat_index(blocks.size, x, y, z)
-                blocks.flags[cell] &= _ALL_FLAGS - CANDIDATE
-                if blocks.flags[cell] & ROOM and _meets_edge(blocks, x, y, z):
-                    blocks.flags[cell] |= CANDIDATE
-                    apart = _from_middle(low, high, x, y, z)
-                    if apart < nearest:
-                        best, nearest = cell, apart
-    blocks.candidate[block], blocks.dirty[block] = best, 0
-    return best != before
+                chosen = blocks.flags[cell] & ROOM and _meets_edge(blocks, x, y, z)
+                set_flag(blocks, cell, CANDIDATE, chosen)
+    blocks.candidate[block], blocks.dirty[block] = _nearest_to_middle(blocks, block, _NO_COSTS), 0
 
 
 @inlined_kernel
@@ -218,17 +177,40 @@ def _meets_edge(blocks, x, y, z):
     return False
 
 
+@inlined_kernel
+def _from_middle(low, high, x, y, z):
+    """Return the squared distance of a cell from the middle of its block, in half cells."""
+    dx, dy, dz = 2 * x + 1 - low[0] - high[0], 2 * y + 1 - low[1] - high[1], 2 * z + 1 - low[2] - high[2]
+    return dx * dx + dy * dy + dz * dz
+
+
+@lean_kernel
+def _nearest_to_middle(blocks, block, cost):
+    """Return the CANDIDATE cell nearest to the middle of its block to which a path leads; NONE = none.
+
+    Args:
+        blocks: The blocks.
+        block: One of them.
+        cost: (N,) float64 path costs, inf = no path; (0,) = paths do not matter.
+    """
+    low, high = block_span(blocks, block)
+    best, nearest = NONE, math.inf
+    for x in range(low[0], high[0]):
+        for y in range(low[1], high[1]):
+            for z in range(low[2], high[2]):
+                cell = flat_index(blocks.size, x, y, z)
+                if blocks.flags[cell] & CANDIDATE and (len(cost) == 0 or not math.isinf(cost[cell])):
+                    apart = _from_middle(low, high, x, y, z)
+                    if apart < nearest:
+                        best, nearest = cell, apart
+    return best
+
+
 @lean_kernel
 def replace_unreached(blocks, cost):
     """Choose other candidates where no path leads to a block's; (N,) float64 path costs, inf = no path."""
     for block in range(len(blocks.candidate)):
-        if blocks.candidate[block] == NONE or not math.isinf(cost[blocks.candidate[block]]):
-            continue
-        low, high = block_span(blocks, block)
-        nearest = math.inf
-        for x in range(low[0], high[0]):
-            for y in range(low[1], high[1]):
-                for z in range(low[2], high[2]):
-                    cell, apart = flat_index(blocks.size, x, y, z), _from_middle(low, high, x, y, z)
-                    if blocks.flags[cell] & CANDIDATE and apart < nearest and not math.isinf(cost[cell]):
-                        blocks.candidate[block], nearest = cell, apart
+        if blocks.candidate[block] != NONE and math.isinf(cost[blocks.candidate[block]]):
+            reached = _nearest_to_middle(blocks, block, cost)
+            if reached != NONE:
+                blocks.candidate[block] = reached

@@ -1,7 +1,6 @@
 """The frontier of one robot's belief: candidates to scan from, and how much is expected to be seen from them.
 
-One interface for two kinds of maps: `voxel_frontiers`, for plans and any 3-D space, and `terrain_frontiers`,
-over a height field.
+One interface for two maps: `voxel_frontiers`, for plans and 3-D space, and `terrain_frontiers`.
 """
 
 from __future__ import annotations
@@ -14,9 +13,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.frontiers.blocks import EXCLUDED, NONE
+from entropy_explore_env.frontiers.blocks import COVERED, EDGE, EXCLUDED, NONE, UNMAPPED, Blocks, mark_around
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
-from entropy_explore_env.frontiers.visibility import VisibilityCounter
+from entropy_explore_env.frontiers.visibility import new_counter
 from entropy_explore_env.frontiers.voxel_states import VoxelStates
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
@@ -42,8 +41,8 @@ class FrontierConfig:
         spacing_m: Distance between candidates, at least a voxel; None = a sixth of the range.
         visibility: `ray-cast`, or the `naive` count of all unexplored points in a ball.
         gamma: γ of the height factor: relative height against absolute height. None = no height factor.
-        unexplored_ground: Over terrain, the assumed shape of unexplored ground: `falling` from z_av
-            at the candidate to the workspace's floor where the range ends (sect. 3.4), or `level` at z_av.
+        unexplored_ground: Of terrain, as it is assumed: `falling` from z_av at the candidate to the
+            workspace's floor where the range ends (sect. 3.4), or `level` at z_av.
 
     Raises:
         SettingError: A field has another value.
@@ -65,100 +64,167 @@ class FrontierConfig:
 
 
 class Chart(NamedTuple):
-    """What a robot knows, seen from above, for pictures; (X, Y) each."""
+    """What a robot knows, seen from above, for pictures; (X, Y) bool, the ground float64."""
 
     mapped: np.ndarray
-    """bool"""
     covered: np.ndarray
-    """bool, walls; over terrain none."""
+    """Walls; over terrain none."""
     edge: np.ndarray
-    """bool, mapped beside unexplored."""
+    """Mapped beside unexplored."""
     ground: np.ndarray
-    """float64, height of the ground above the floor in voxel edges; NaN = not mapped, or a plan."""
+    """Height of the ground above the floor in voxel edges; NaN = not mapped, or a plan."""
 
 
 class FrontierMap(ABC):
     """Candidates of one robot's belief, each in a slot, and V(height factor) of each in points.
 
+    Counts are reused as upper bounds: while the map grows, no more unexplored points can be seen from a place
+    than before. Only voxels that turn free, or are unexplored again, raise the bounds.
+
     Attributes:
         reach: Of the sensor, in voxel edges; no more than the workspace is wide.
-        point: Size of a point: m² in plans and over terrain, else m³.
-        batch: How many candidates are counted in one call; it changes no result.
-        traversal_cost: (V,) float32, 1 in the mapped region, else inf; read-only.
-        body_reach: Voxels that the body extends beyond its own, along an axis.
+        changed: How many voxels the latest update found in another state.
     """
 
     point: float
+    """Size of a point: m² in plans and over terrain, else m³."""
     batch: int
+    """How many candidates are counted in one call; it changes no result."""
     body_reach: int
+    """Voxels that the body extends beyond its own, along an axis."""
     _states: VoxelStates
-    _counter: VisibilityCounter
+    _blocks: Blocks
     _costs: np.ndarray
     """(V,) float32 traversal costs."""
     _voxels: np.ndarray
     """(S,) int32, the voxel of the candidate in each slot; NONE = there is none."""
-    _bounds: np.ndarray
-    """(S,) float64, upper bounds of its V·(height factor); inf = unknown."""
     _marks: np.ndarray
     """(V,) uint8, EXCLUDED where a scan was taken."""
+    _rays: np.ndarray
+    """Imagined rays all around."""
+    _gaze_pitches: Sequence[float]
+    """Pitches between which a gaze is chosen."""
+    _most: float
+    """No more V·(height factor) is seen from any place."""
 
     def __init__(self, scenario: Scenario, kind: RobotKind, frontiers: FrontierConfig) -> None:
-        """Nothing is explored yet."""
+        """Take the settings; nothing is explored yet."""
         grid = scenario.grid
         self._config, self._size, self._edge = frontiers, grid.shape, grid.voxel_size_m
         self._prior, self._naive = scenario.sigma_prior**-2, frontiers.visibility == "naive"
         self.reach = min(kind.sensor.max_range_m / self._edge, float(sum(grid.shape)))
         self._spacing = max(round((frontiers.spacing_m or self.reach * self._edge / 6.0) / self._edge), 1)
         """Voxels between candidates."""
+        self.changed, self._sigma = 0, math.nan
+
+    def _start(self, points: int) -> None:
+        """Prepare counts of so many points, once states, blocks, costs and candidates are there."""
+        self._counter = new_counter(points, self._size)
+        self._bounds = np.full(len(self._voxels), np.inf)
+        """(S,) float64, upper bounds of the candidates' V·(height factor); inf = unknown."""
+        self._bounded = self._voxels.copy()
+        """(S,) int32, the candidates of which these are the bounds."""
+        self.body_reach = self._blocks.reach
 
     @property
     def traversal_cost(self) -> np.ndarray:
-        """See above."""
-        view = self._costs.view()
-        view.setflags(write=False)
-        return view
+        """(V,) float32, 1 in the mapped region, else inf; read-only."""
+        costs = self._costs.view()
+        costs.flags.writeable = False
+        return costs
 
-    @abstractmethod
     def update(self, view: RobotKnowledge, sigma: float) -> None:
         """Bring the map up to date with the belief; σ is the level that counts as explored now."""
+        least = self._prior * (1.0 + 1e-6)
+        levels = np.float32(max(sigma**-2, least)), np.float32(max(KNOWN_SIGMA**-2, least))
+        if sigma != self._sigma:
+            self._states.sums[:], self._sigma = 0, sigma
+        self.changed = int(self._read(view.mean.reshape(-1), view.precision.reshape(-1), levels))
+        self._forget_bounds()
+        opened = self._states.opened[: self._states.opened_count[0]]
+        self._states.opened_count[0] = 0
+        if len(opened):
+            self._raise_bounds(opened)
+
+    def _refresh(self, voxels: np.ndarray, radius: int) -> None:
+        """Find the candidates anew within a radius of (K,) voxels."""
+        layers = len(self._costs) // len(self._blocks.state)
+        for voxel in voxels.tolist():
+            mark_around(self._blocks, voxel // layers, radius)
+        self._find_candidates()
+        self._forget_bounds()
+
+    def _forget_bounds(self) -> None:
+        """Forget the bounds of candidates that are others than before."""
+        moved = self._voxels != self._bounded
+        self._bounds[moved], self._bounded[moved] = math.inf, self._voxels[moved]
 
     @abstractmethod
-    def mapped_share(self) -> float:
-        """Return the share of all points that are mapped."""
+    def _read(self, mean: np.ndarray, precision: np.ndarray, levels: tuple[np.float32, np.float32]) -> int:
+        """Read a (V,) belief; return how many voxels changed. See `update_states`."""
 
     @abstractmethod
-    def chart(self) -> Chart:
-        """Return what is known, seen from above; in 3-D the union over all heights."""
-
-    @abstractmethod
-    def upper_bounds(self, slots: np.ndarray) -> np.ndarray:
-        """Return (K,) upper bounds of V·(height factor) of the candidates in (K,) slots."""
-
-    @abstractmethod
-    def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
-        """Return (K,) V·(height factor): points expected to be seen, weighted by promises."""
-
-    @abstractmethod
-    def promise(self, place: np.ndarray) -> None:
-        """Note that a robot will scan at (3,), grid units: it promises to see the points visible there."""
+    def _find_candidates(self) -> None:
+        """Find the candidates of the blocks that have to be updated."""
 
     @abstractmethod
     def replace_unreached(self, cost: np.ndarray) -> None:
         """Replace candidates that no path reaches by others of their blocks; (V,) float64 path costs."""
 
     @abstractmethod
-    def _refresh(self, voxels: np.ndarray, radius: int) -> None:
-        """Find the candidates anew within a radius of (K,) voxels."""
+    def _raise_bounds(self, opened: np.ndarray) -> None:
+        """Raise the bounds by what may be visible past (N,) int32 voxels."""
 
     @abstractmethod
-    def _gaze_pitches(self, view: RobotKnowledge) -> Sequence[float]:
-        """Return the pitches between which a gaze is chosen."""
+    def _count_from(self, voxels: np.ndarray, seen: np.ndarray, weighed: np.ndarray) -> None:
+        """Fill in (K,) points seen from (K,) int32 voxels all around, and (K,) these weighed by promises."""
 
     @abstractmethod
-    def _points_ahead(
-        self, place: np.ndarray, view: RobotKnowledge, pitch: float, yaws: Sequence[float]
-    ) -> list[int]:
-        """Return how many points are seen from (3,), grid units, with gazes of one pitch."""
+    def _count_rays(self, place: np.ndarray, rays: np.ndarray, marking: bool) -> tuple[int, float]:
+        """Count the points that rays from (3,), grid units, meet: their number, and weight."""
+
+    @abstractmethod
+    def _rays_ahead(self, view: RobotKnowledge, yaw: float, pitch: float) -> np.ndarray:
+        """Return the rays of one gaze."""
+
+    @abstractmethod
+    def _count_ball(self, place: np.ndarray, marking: bool) -> tuple[int, float]:
+        """Count the naive V at (3,), grid units: points in a ball, seen or not."""
+
+    def mapped_share(self) -> float:
+        """Return the share of all points that are mapped."""
+        return float((self._blocks.state & UNMAPPED == 0).mean())
+
+    def chart(self) -> Chart:
+        """Return what is known, seen from above; in 3-D the union over all heights."""
+        layer = self._blocks.layer
+        layers = slice(None) if layer < 0 else slice(layer, layer + 1)
+        state, flags = (
+            cells.reshape(*self._size[:2], -1)[:, :, layers]
+            for cells in (self._blocks.state, self._blocks.flags)
+        )
+        marks = state & UNMAPPED == 0, state & COVERED > 0, flags & EDGE > 0
+        mapped, covered, edge = (np.asarray(mark.any(2)) for mark in marks)
+        return Chart(mapped, covered, edge, np.full(self._size[:2], np.nan))
+
+    def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
+        """Return (K,) V·(height factor): points expected to be seen, weighted by promises."""
+        self._bounds[slots], weighed = self._counted(voxels)
+        return weighed
+
+    def _counted(self, voxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return (K,) V·(height factor) of (K,) int32 voxels without promises, and (K,) weighted by them."""
+        seen, weighed = np.empty(len(voxels)), np.empty(len(voxels))
+        if self._naive:
+            for place, centre in enumerate(self._axes_of(voxels) + 0.5):
+                seen[place], weighed[place] = self._count_ball(centre, marking=False)
+        else:
+            self._count_from(voxels, seen, weighed)
+        return seen, weighed
+
+    def upper_bounds(self, slots: np.ndarray) -> np.ndarray:
+        """Return (K,) upper bounds of V·(height factor) of the candidates in (K,) slots."""
+        return np.minimum(self._bounds[slots], self._most)
 
     def listed(self, all_of_them: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Return (K,) slots and (K,) int32 voxels of candidates: all, or those that may see something."""
@@ -169,18 +235,23 @@ class FrontierMap(ABC):
         """Return (K,) int32 voxels of the candidates in some slots; NONE = there is none."""
         return self._voxels[slots]
 
-    def expected(self, place: np.ndarray) -> np.ndarray:
-        """Return (X, Y) bool, columns with points that are expected to be seen from (3,), grid units."""
-        self.promise(place)
-        found = self._counter.promised > 0
-        self.release()
-        return np.asarray(found.reshape(*self._size[:2], -1).any(2))
+    def promise(self, place: np.ndarray) -> None:
+        """Note that a robot will scan at (3,), grid units: it promises to see the points visible there."""
+        if self._naive:
+            self._count_ball(place, marking=True)
+        else:
+            self._count_rays(place, self._rays, marking=True)
 
     def release(self) -> None:
         """Forget all promises."""
-        counter = self._counter
-        counter.promised[counter.promised_points[: counter.promised_count[0]]] = 0
-        counter.promised_count[0] = 0
+        self._counter.promised[:] = 0
+
+    def expected(self, place: np.ndarray) -> np.ndarray:
+        """Return (X, Y) bool, columns with points that are expected to be seen from (3,), grid units."""
+        self.promise(place)
+        found = (self._counter.promised > 0).reshape(*self._size[:2], -1).any(2)
+        self.release()
+        return np.asarray(found)
 
     def exclude(self, voxel: int) -> None:
         """Note that a scan was taken in a voxel: it is no candidate any more."""
@@ -189,7 +260,6 @@ class FrontierMap(ABC):
 
     def drop(self, voxel: int, with_edges: bool) -> None:
         """Take out a candidate that could not be reached, or from which a scan explored nothing."""
-        del with_edges
         self.exclude(voxel)
 
     def is_known_free(self, voxel: int) -> bool:
@@ -204,7 +274,6 @@ class FrontierMap(ABC):
 
     def open_start(self, voxel: int) -> list[int]:
         """Make the place where a robot stands passable; return the numbers of the voxels that were not."""
-        del voxel
         return []
 
     def close(self, voxels: list[int]) -> None:
@@ -214,17 +283,16 @@ class FrontierMap(ABC):
     def gaze(self, place: np.ndarray, view: RobotKnowledge) -> tuple[float, float]:
         """Return the (yaw, pitch) in which most is seen from (3,), grid units; as it is if none sees more."""
         turns = 1 if sees_all_around(view.kind.sensor) else _HEADINGS
-        yaws = [float(view.pose[3]) + turn * (_TURN / _HEADINGS) for turn in range(turns)]
-        pitches = self._gaze_pitches(view)
-        if len(pitches) * turns == 1:
-            return yaws[0], pitches[0]
-        best = int(np.argmax([self._points_ahead(place, view, pitch, yaws) for pitch in pitches]))
-        return (yaws[best % turns] + math.pi) % _TURN - math.pi, pitches[best // turns]
-
-    def _levels(self, sigma: float) -> tuple[np.float32, np.float32]:
-        """Return the precisions from which on a voxel counts as explored now, at σ, and as mapped."""
-        least = self._prior * (1.0 + 1e-6)
-        return np.float32(max(sigma**-2, least)), np.float32(max(KNOWN_SIGMA**-2, least))
+        gazes = [
+            (float(view.pose[3]) + turn * (_TURN / _HEADINGS), pitch)
+            for pitch in self._gaze_pitches
+            for turn in range(turns)
+        ]
+        if len(gazes) == 1:
+            return gazes[0]
+        seen = [self._count_rays(place, self._rays_ahead(view, *gaze), marking=False)[0] for gaze in gazes]
+        yaw, pitch = gazes[int(np.argmax(seen))]
+        return (yaw + math.pi) % _TURN - math.pi, pitch
 
     def _axes_of(self, voxels: np.ndarray) -> np.ndarray:
         """Return (K, 3) indices of (K,) voxels."""

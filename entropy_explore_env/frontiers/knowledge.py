@@ -16,7 +16,6 @@ from entropy_explore_env.belief.visibility import CONE, cone_of
 from entropy_explore_env.robots.motion import MoveEnd, driving_time
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import Grid, RobotKind
-from entropy_explore_env.viewpoints.drawing import uniform_viewpoint
 
 
 class TeammateKnowledge(Protocol):
@@ -121,6 +120,8 @@ class RobotKnowledge(Protocol):
     def teammates(self) -> Mapping[int, TeammateKnowledge]: ...
 
 
+_DRAWS = 64
+"""Places that are drawn until one lies within reach."""
 _LOST_AFTER = 2.0
 """A silent robot counts as under way for this many times a drive along all sides of the workspace."""
 
@@ -183,13 +184,24 @@ def announced_cone(grid: Grid, mate: TeammateKnowledge) -> np.void:
 def announced_cones(view: RobotKnowledge) -> np.ndarray:
     """Return (M,) CONE of what teammates have announced to see, in grid units."""
     heard = [mate for mate in view.teammates.values() if mate.announced_s >= 0.0 and mate.depth_m > 0.0]
-    cones = np.zeros(len(heard), CONE)
-    for place, mate in enumerate(heard):
-        cones[place] = announced_cone(view.scenario.grid, mate)
-    return cones
+    return np.array([announced_cone(view.scenario.grid, mate) for mate in heard], CONE)
 
 
 def random_viewpoint(view: RobotKnowledge, rng: np.random.Generator) -> np.ndarray:
     """Return a viewpoint (5,) drawn uniformly within a robot's reach, the gaze in any direction."""
-    grid, reach_m = view.scenario.grid, view.kind.robot.reach_m
-    return uniform_viewpoint(grid, reach_m, view.pose, view.planar, view.level, rng)
+    grid, reach_m, axes = view.scenario.grid, view.kind.robot.reach_m, 2 if view.planar else 3
+    low = np.asarray(grid.origin_m)
+    high = low + grid.size_m
+    viewpoint = view.pose.copy()
+    here = view.pose[:axes]
+    if math.isinf(reach_m):  # actions reach from the centre of the first voxel to that of the last
+        low, high = low + 0.5 * grid.voxel_size_m, high - 0.5 * grid.voxel_size_m
+    lowest, highest = np.maximum(low[:axes], here - reach_m), np.minimum(high[:axes], here + reach_m)
+    for _ in range(_DRAWS):
+        place = rng.uniform(lowest, highest)
+        if ((place - here) ** 2).sum() <= reach_m**2:
+            viewpoint[:axes] = place
+            break
+    viewpoint[3] = rng.uniform(-math.pi, math.pi)
+    viewpoint[4] = 0.0 if view.level else math.asin(rng.uniform(-1.0, 1.0))
+    return viewpoint

@@ -18,7 +18,7 @@ from entropy_explore_env.belief.paths.string_pulling import line_of_sight_cost, 
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
-from entropy_explore_env.frontiers.voxel_map import box_around, voxels_in
+from entropy_explore_env.frontiers.voxel_map import voxels_around
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
 
@@ -27,6 +27,8 @@ _ROOM, _ROOM_DRAWS = 40, 64
 _FIRST_REACH = 8.0
 _EXTENSION = 1.5
 """Searches go so far at first, in voxel edges, and then this many times as far until that is enough."""
+_FARTHER = 1.3
+"""As _EXTENSION, of searches that need all of some lengths."""
 
 
 class KnownPaths:
@@ -98,17 +100,37 @@ class KnownPaths:
             others: Where the paths end.
             most: No path is longer.
         """
-        if self.lattice.layer >= 0:
-            lengths, opened = np.empty(len(others)), self._cells.open_start(voxel)
-            fill_layer_lengths(self.search, self.lattice, self.costs, voxel, others, lengths)
-            self._cells.close(opened)
-            return lengths
+        if self.lattice.layer < 0:
+            return self._lengths_by_search(voxel, others, 0.0, most)
+        lengths, opened = np.empty(len(others)), self._cells.open_start(voxel)
+        fill_layer_lengths(self.search, self.lattice, self.costs, voxel, others, lengths)
+        self._cells.close(opened)
+        return lengths
+
+    def _lengths_by_search(self, voxel: int, others: np.ndarray, least: float, most: float) -> np.ndarray:
+        """Return what `lengths_from` does, by a new search that goes `least` to `most` far."""
         self.start(voxel)
+        self.extend(least)
         lengths = self.lengths_to(others)
         while self.reach < most and not (lengths <= self.reach).all():
-            self.extend(most if math.isinf(most) else min(1.3 * self.reach, most))
+            self.extend(most if math.isinf(most) else min(_FARTHER * self.reach, most))
             lengths = self.lengths_to(others)
         return lengths
+
+    def mean_length(self, voxel: int, others: np.ndarray, least: float, most: float) -> float:
+        """Return the mean length of the paths from (N,) int32 voxels to a voxel.
+
+        It makes a new search, which `lengths_to` reads.
+
+        Args:
+            voxel: Where the paths end.
+            others: Where they begin; those that no path of length `most` connects do not count.
+            least: Some path is at least this long.
+            most: No path is longer; finite.
+        """
+        lengths = self._lengths_by_search(voxel, others, least, most)
+        lengths = lengths[lengths <= self.reach]
+        return float(lengths.sum()) / max(len(lengths), 1)
 
     def lengths_between(self, places: np.ndarray, lengths: np.ndarray) -> np.ndarray:
         """Return (1 + K, 1 + K) lengths of the shortest paths between the robot and K places; new searches.
@@ -128,8 +150,7 @@ class KnownPaths:
 
     def around(self, voxel: int, radius: int) -> np.ndarray:
         """Return (N,) int32 voxels that the latest search reached, within a radius along every axis."""
-        box = box_around(self._grid.shape, voxel, radius, self.lattice.layer)
-        near = voxels_in(box, self._grid.shape)
+        near = voxels_around(self._grid.shape, voxel, radius, self.lattice.layer)
         lengths = self.lengths_to(near)
         return near[(lengths <= self.reach) & np.isfinite(lengths)]
 
@@ -156,20 +177,6 @@ class KnownPaths:
         apart = np.min([self.lengths_from(other, drawn) for other in others], axis=0)
         nearer = np.flatnonzero((own < apart) & (drawn != here))
         return int(drawn[nearer[np.argmax(apart[nearer])]]) if len(nearer) else NONE
-
-    def mean_length(self, voxel: int, others: np.ndarray, least: float, most: float) -> float:
-        """Return the mean length of the paths from (N,) int32 voxels to a voxel.
-
-        It makes a new search, which `lengths_to` reads.
-
-        Args:
-            voxel: Where the paths end.
-            others: Where they begin; those that no path of length `most` connects do not count.
-            least: Some path is at least this long.
-            most: No path is longer.
-        """
-        source, arrays = np.array([voxel], np.int32), (self.search, self.lattice, self.costs)
-        return float(mean_length_from(*arrays, source, others, least, most))
 
     def is_line_free(self, first: np.ndarray, second: np.ndarray) -> bool:
         """Whether the straight line between two places (3,), in voxel edges, is known to be free."""
@@ -222,30 +229,3 @@ def fill_free_lines(
             if apart <= farthest:
                 cost = line_of_sight_cost(search, lattice, costs, a, b)
                 seen[first, second] = seen[second, first] = not math.isinf(cost)
-
-
-@lean_kernel
-def mean_length_from(
-    search: Search,
-    lattice: Lattice,
-    costs: Costs,
-    source: np.ndarray,
-    voxels: np.ndarray,
-    least: float,
-    most: float,
-) -> float:
-    """Return the mean length of the paths from a source (1,) to voxels; see `KnownPaths.mean_length`."""
-    start_search(search, lattice, costs, source)
-    reach = max(least, 1.0)
-    while True:
-        resume_search(search, lattice, costs, reach)
-        total, missing = 0.0, 0
-        for voxel in voxels:
-            length = cost_to(search, voxel)
-            if length <= reach and not math.isinf(length):
-                total += length
-            else:
-                missing += 1
-        if missing == 0 or reach >= most:
-            return total / max(len(voxels) - missing, 1)
-        reach = min(1.2 * reach, most)

@@ -6,14 +6,14 @@ Counts are reused as long as nothing changes within range.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from scipy import ndimage
 
-from entropy_explore_env.frontiers.blocks import EDGE, NONE, UNEXPLORED, queue_all_around, replace_unreached
+from entropy_explore_env.frontiers.blocks import NONE, UNEXPLORED, replace_unreached
 from entropy_explore_env.frontiers.frontier_map import BATCH_CELLS, Chart, FrontierConfig, FrontierMap
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
+from entropy_explore_env.frontiers.ray_tree import yaws_around
 from entropy_explore_env.frontiers.terrain_map import (
     fill_column_costs,
     new_terrain_map,
@@ -23,14 +23,14 @@ from entropy_explore_env.frontiers.terrain_map import (
 )
 from entropy_explore_env.frontiers.terrain_visibility import (
     ViewModel,
-    bound_columns,
     count_below,
     count_columns_from,
     count_columns_in_ball,
+    count_in_range,
+    fill_height_factors,
     half_widths,
     mean_ground,
 )
-from entropy_explore_env.frontiers.visibility import new_counter
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
 
@@ -48,110 +48,102 @@ class TerrainFrontiers(FrontierMap):
     def __init__(
         self, scenario: Scenario, kind: RobotKind, frontiers: FrontierConfig, ceiling: np.ndarray
     ) -> None:
-        """Nothing is explored yet."""
+        """Take the settings, and (X, Y) the lowest layers of the no-fly zone; nothing is explored yet."""
         super().__init__(scenario, kind, frontiers)
         (x, y, high), edge = self._size, self._edge
         self._map = new_terrain_map(self._size, kind.robot.planning_radius_m / edge, self._spacing, ceiling)
-        self._states, self._costs = self._map.states, self._map.traversal_cost
-        self._voxels, self._bounds, self._marks = self._map.voxel, self._map.bounds, self._map.excluded
-        self._counter, self.body_reach = new_counter(x * y, self._size), self._map.columns.reach
-        turns = min(math.ceil(2.0 * math.pi * self.reach), 720)
-        angles = (np.arange(turns) + 0.5) * (2.0 * math.pi / turns)
-        self._azimuths = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-        self._tilt = kind.sensor.field_of_view_rad[1]
-        self._view_model = ViewModel(
+        self._states, self._blocks = self._map.states, self._map.columns
+        self._costs, self._marks = self._map.traversal_cost, self._map.excluded
+        self._voxels = self._map.voxel.reshape(-1)
+        self._start(x * y)
+        yaws, tilt = yaws_around(self.reach), kind.sensor.field_of_view_rad[1]
+        self._rays = np.stack([np.cos(yaws), np.sin(yaws)], axis=-1)
+        self._gaze_pitches = (0.5 * math.pi - 0.5 * tilt,)  # the lowest rays lead straight down
+        self._model = ViewModel(
             self.reach,
-            min_tangent=math.tan(min(max(0.5 * math.pi - self._tilt, 0.0), 1.5)),
+            min_tangent=math.tan(min(max(0.5 * math.pi - tilt, 0.0), 1.5)),
             patch=max(round(PATCH_M / edge), 0),
             gamma=-1.0 if frontiers.gamma is None else frontiers.gamma,
             unit=edge,
             highest=TOO_HIGH * self.reach,
             fade=self.reach if frontiers.unexplored_ground == "falling" else math.inf,
         )
-        self.point = edge**2
-        self._widths, self._far = half_widths(self.reach), self.reach + self._view_model.patch
-        self.batch = 1 + BATCH_CELLS // max(math.ceil(turns * self.reach), 1)
+        self._widths, self.point = half_widths(self.reach), edge**2
+        self.batch = 1 + BATCH_CELLS // max(math.ceil(len(yaws) * self.reach), 1)
         factor = 1.0 if frontiers.gamma is None else edge * high
         self._most = min(math.pi * (self.reach + 2.0) ** 2, float(x * y)) * factor
-        """No more is seen from any place."""
 
-    def update(self, view: RobotKnowledge, sigma: float) -> None:
+    def _read(self, mean: np.ndarray, precision: np.ndarray, levels: tuple[np.float32, np.float32]) -> int:
         """See `FrontierMap`."""
-        update_terrain(self._map, view.mean.reshape(-1), view.precision.reshape(-1), self._levels(sigma))
-        count = int(self._states.noted_count[0])
-        self._states.noted_count[0] = 0
-        if count > 0:
-            slots = np.flatnonzero(self._voxels != NONE)
-            near = tiles_near(self._axes_of(self._states.noted[:count]), self._size, self._far)
-            x, y, _ = (self._axes_of(self._voxels[slots]) // TILE).T
-            self._bounds[slots[near[x, y]]] = math.inf
+        return int(update_terrain(self._map, mean, precision, levels))
 
-    def mapped_share(self) -> float:
+    def _find_candidates(self) -> None:
         """See `FrontierMap`."""
-        return float((self._map.ground != NONE).mean())
+        update_columns(self._map)
+
+    def replace_unreached(self, cost: np.ndarray) -> None:
+        """See `FrontierMap`."""
+        before, costs = self._blocks.candidate.copy(), np.empty(len(self._blocks.state))
+        fill_column_costs(self._map, cost, costs)
+        replace_unreached(self._blocks, costs)
+        for block in np.flatnonzero(self._blocks.candidate != before):
+            take_column(self._map, block)
+        self._forget_bounds()
+
+    def _raise_bounds(self, opened: np.ndarray) -> None:
+        """Forget the bounds of candidates within range; see `FrontierMap`."""
+        slots = np.flatnonzero(self._voxels != NONE)
+        near = tiles_near(self._axes_of(opened), self._size, self.reach + self._model.patch)
+        x, y, _ = (self._axes_of(self._voxels[slots]) // TILE).T
+        self._bounds[slots[near[x, y]]] = math.inf
 
     def chart(self) -> Chart:
         """See `FrontierMap`."""
-        mapped, edge = self._map.ground != NONE, self._map.columns.flags.reshape(self._size[:2]) & EDGE > 0
-        ground = np.where(mapped, self._map.ground.astype(float), np.nan)
-        return Chart(mapped, np.zeros_like(mapped), edge, ground)
+        ground = self._map.ground
+        return super().chart()._replace(ground=np.where(ground != NONE, ground.astype(float), np.nan))
 
     def upper_bounds(self, slots: np.ndarray) -> np.ndarray:
         """See `FrontierMap`; where nothing is counted yet, by the unexplored columns in range."""
         fresh = slots[np.isinf(self._bounds[slots])]
         if len(fresh):
-            unexplored = self._map.columns.state.reshape(self._size[:2]) & UNEXPLORED
-            sums, bounds = np.pad(np.cumsum(unexplored, 1, np.int32), ((0, 0), (1, 0))), np.empty(len(fresh))
-            bound_columns(self._map, sums, self._widths, self._voxels[fresh], self._view_model, bounds)
-            self._bounds[fresh] = bounds
-        return np.minimum(self._bounds[slots], self._most)
+            unexplored = self._blocks.state.reshape(self._size[:2]) & UNEXPLORED
+            sums, found = np.pad(np.cumsum(unexplored, 1, np.int32), ((0, 0), (1, 0))), np.empty(len(fresh))
+            count_in_range(self._map, sums, self._widths, self._voxels[fresh], found)
+            self._bounds[fresh] = found * self._factors(self._voxels[fresh])
+        return super().upper_bounds(slots)
 
-    def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
+    def _counted(self, voxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `FrontierMap`."""
-        seen, weighed = np.empty(len(voxels)), np.empty(len(voxels))
-        arrays = self._counter, self._map, voxels, self._azimuths, self._view_model
-        count_columns_from(*arrays, self._naive, seen, weighed)
-        self._bounds[slots] = seen
-        return weighed
+        (seen, weighed), factors = super()._counted(voxels), self._factors(voxels)
+        return seen * factors, weighed * factors
 
-    def promise(self, place: np.ndarray) -> None:
+    def _count_from(self, voxels: np.ndarray, seen: np.ndarray, weighed: np.ndarray) -> None:
         """See `FrontierMap`."""
-        arrays = self._counter, self._map, *self._from(place)
-        if self._naive:
-            count_columns_in_ball(*arrays, self._view_model, True)
-        else:
-            count_below(*arrays, self._azimuths, self._view_model, True)
+        count_columns_from(self._counter, self._map, voxels, self._rays, self._model, seen, weighed)
+
+    def _factors(self, voxels: np.ndarray) -> np.ndarray:
+        """Return (K,) height factors of (K,) int32 voxels."""
+        factors = np.empty(len(voxels))
+        fill_height_factors(self._map, voxels, self._model, factors)
+        return factors
+
+    def _count_rays(self, place: np.ndarray, rays: np.ndarray, marking: bool) -> tuple[int, float]:
+        """See `FrontierMap`; rays are (D, 2) unit vectors over the ground."""
+        return count_below(self._counter, self._map, *self._from(place), rays, self._model, marking)
+
+    def _rays_ahead(self, view: RobotKnowledge, yaw: float, pitch: float) -> np.ndarray:
+        """See `FrontierMap`."""
+        half_turn = 0.5 * view.kind.sensor.field_of_view_rad[0]
+        return self._rays[self._rays @ (math.cos(yaw), math.sin(yaw)) >= math.cos(half_turn)]
+
+    def _count_ball(self, place: np.ndarray, marking: bool) -> tuple[int, float]:
+        """See `FrontierMap`."""
+        return count_columns_in_ball(self._counter, self._map, *self._from(place), self._model, marking)
 
     def _from(self, place: np.ndarray) -> tuple[tuple[float, ...], float]:
         """Return an eye at (3,), grid units, and z_av there."""
         eye = tuple(place.tolist())
-        return eye, mean_ground(self._map, int(eye[0]), int(eye[1]), self._view_model.patch)
-
-    def _refresh(self, voxels: np.ndarray, radius: int) -> None:
-        """See `FrontierMap`."""
-        update_columns(self._map, queue_all_around(self._map.columns, voxels // self._size[2], radius))
-
-    def replace_unreached(self, cost: np.ndarray) -> None:
-        """See `FrontierMap`."""
-        columns = self._map.columns
-        before, costs = columns.candidate.copy(), np.empty(len(columns.state))
-        fill_column_costs(self._map, cost, costs)
-        replace_unreached(columns, costs)
-        for block in np.flatnonzero(columns.candidate != before):
-            take_column(self._map, block)
-
-    def _gaze_pitches(self, view: RobotKnowledge) -> Sequence[float]:
-        """Return one: down, with the lowest rays straight down."""
-        return (0.5 * math.pi - 0.5 * self._tilt,)
-
-    def _points_ahead(
-        self, place: np.ndarray, view: RobotKnowledge, pitch: float, yaws: Sequence[float]
-    ) -> list[int]:
-        """See `FrontierMap`."""
-        half_turn = 0.5 * view.kind.sensor.field_of_view_rad[0]
-        arrays, azimuths = (self._counter, self._map, *self._from(place)), self._azimuths
-        ahead = (azimuths @ (math.cos(yaw), math.sin(yaw)) >= math.cos(half_turn) for yaw in yaws)
-        return [count_below(*arrays, azimuths[seen], self._view_model, False)[0] for seen in ahead]
+        return eye, mean_ground(self._map, int(eye[0]), int(eye[1]), self._model.patch)
 
 
 def tiles_near(places: np.ndarray, size: tuple[int, int, int], reach: float) -> np.ndarray:

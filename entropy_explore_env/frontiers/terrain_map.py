@@ -19,18 +19,19 @@ from entropy_explore_env.frontiers.blocks import (
     CANDIDATE,
     COVERED,
     NONE,
+    ROOM,
     UNEXPLORED,
     UNMAPPED,
     Blocks,
     block_span,
     choose_candidate,
+    mark_around,
     mark_edges,
     new_blocks,
-    queue_around,
-    set_room,
+    set_flag,
 )
 from entropy_explore_env.frontiers.voxel_map import body_footprint
-from entropy_explore_env.frontiers.voxel_states import VoxelStates, new_states, note_more, update_states
+from entropy_explore_env.frontiers.voxel_states import VoxelStates, new_states, note_opened, update_states
 
 
 class TerrainMap(NamedTuple):
@@ -46,9 +47,7 @@ class TerrainMap(NamedTuple):
     traversal_cost: np.ndarray
     """(V,) float32, 1 where the body may be, else inf."""
     voxel: np.ndarray
-    """(B·H,) int32, candidates; NONE = none at this height."""
-    bounds: np.ndarray
-    """(B·H,) float64, upper bound of V·(height factor) from there; inf = unknown."""
+    """(B, H) int32, candidates; NONE = none at this height."""
     ceiling: np.ndarray
     """(X, Y) int32, lowest layer of the no-fly zone."""
     size: tuple[int, int, int]
@@ -70,19 +69,17 @@ def new_terrain_map(
         ceiling: (X, Y) lowest layer of the no-fly zone.
     """
     footprint, states = body_footprint((3, 3, 3), body_radius, None), new_states(shape)
-    within = np.arange(-int(np.abs(footprint).max()), int(np.abs(footprint).max()) + 1)
-    square = np.stack(np.meshgrid(within, within, [0], indexing="ij"), axis=-1).reshape(-1, 3)
+    reach, voxels = int(np.abs(footprint).max()), math.prod(shape)
+    square = np.array([(x, y, 0) for x in range(-reach, reach + 1) for y in range(-reach, reach + 1)])
     state = np.full(shape[0] * shape[1], UNEXPLORED | UNMAPPED, np.uint8)
     columns = new_blocks((*shape[:2], 1), state, square, 0, spacing)
-    slots, voxels = len(columns.candidate) * math.ceil(shape[2] / spacing), math.prod(shape)
     return TerrainMap(
         states=states,
         columns=columns,
         ground=np.full(shape[:2], NONE, np.int32),
         excluded=np.zeros(voxels, np.uint8),
         traversal_cost=np.full(voxels, np.inf, np.float32),
-        voxel=np.full(slots, NONE, np.int32),
-        bounds=np.full(slots, np.inf),
+        voxel=np.full((len(columns.candidate), math.ceil(shape[2] / spacing)), NONE, np.int32),
         ceiling=np.ascontiguousarray(ceiling, np.int32).copy(),
         size=states.size,
         rise=spacing,
@@ -92,39 +89,37 @@ def new_terrain_map(
 
 @lean_kernel
 def update_terrain(terrain, mean, precision, levels):
-    """Bring a TerrainMap up to date with a belief; arguments as of `update_states`."""
-    columns, count, before = terrain.columns, 0, NONE
-    for place in range(update_states(terrain.states, mean, precision, levels)):
-        voxel = terrain.states.changed[place]
+    """Bring a TerrainMap up to date with a belief; arguments and result as of `update_states`."""
+    columns, before = terrain.columns, NONE
+    changed = update_states(terrain.states, mean, precision, levels)
+    for voxel in terrain.states.changed[:changed]:
         column = voxel // terrain.size[2]
         if column != before:
             if _find_ground(terrain, column):
-                note_more(terrain.states, voxel)
-            count, before = queue_around(columns, column, columns.reach + 2, count), column
-    update_columns(terrain, count)
+                note_opened(terrain.states, voxel)
+            mark_around(columns, column, columns.reach + 2)
+            before = column
+    update_columns(terrain)
+    return changed
 
 
 @lean_kernel
-def update_columns(terrain, count):
-    """Find the edge, the free space and the candidates of the first `count` queued blocks."""
+def update_columns(terrain):
+    """Find the edge, the free space and the candidates of the blocks that have to be updated."""
     columns = terrain.columns
-    mark_edges(columns, count)
-    for place in range(count):
-        block = columns.queued[place]
-        _find_room(terrain, block)
-        choose_candidate(columns, block)
-        take_column(terrain, block)
+    mark_edges(columns)
+    for block in range(len(columns.dirty)):
+        if columns.dirty[block]:
+            _find_room(terrain, block)
+            choose_candidate(columns, block)
+            take_column(terrain, block)
 
 
 @lean_kernel
 def _find_ground(terrain, column):
     """Find a column's ground from its voxels' states; return whether its state changed."""
-    x, y, high, state = (
-        column // terrain.size[1],
-        column % terrain.size[1],
-        terrain.size[2],
-        terrain.states.state,
-    )
+    x, y = column // terrain.size[1], column % terrain.size[1]
+    high, state = terrain.size[2], terrain.states.state
     ground, now = NONE, UNEXPLORED | UNMAPPED
     for layer in range(high - 1, -1, -1):
         voxel = column * high + layer
@@ -148,9 +143,9 @@ def _find_room(terrain, block):
                 voxel = column * terrain.size[2] + z
                 terrain.traversal_cost[voxel] = 1.0 if _may_fly(terrain, x, y, z) else math.inf
             room = False
-            for height in range(_heights(terrain)):
+            for height in range(terrain.voxel.shape[1]):
                 room = room or _at_height(terrain, column, height) != NONE
-            set_room(terrain.columns, column, room)
+            set_flag(terrain.columns, column, ROOM, room)
 
 
 @lean_kernel
@@ -170,12 +165,6 @@ def _may_fly(terrain, x, y, z):
 
 
 @inlined_kernel
-def _heights(terrain):
-    """Return H."""
-    return len(terrain.voxel) // len(terrain.columns.candidate)
-
-
-@inlined_kernel
 def _at_height(terrain, column, height):
     """Return the voxel at a height above a column; NONE where a body cannot be, or has scanned."""
     ground = terrain.ground[column // terrain.size[1], column % terrain.size[1]]
@@ -188,14 +177,10 @@ def _at_height(terrain, column, height):
 
 @lean_kernel
 def take_column(terrain, block):
-    """Set the candidates of a block above the column that represents it."""
+    """Set the candidates of a block: those above the column that represents it."""
     column = terrain.columns.candidate[block]
-    for height in range(_heights(terrain)):
-        slot = block * _heights(terrain) + height
-        voxel = _at_height(terrain, column, height) if column != NONE else NONE
-        if voxel != terrain.voxel[slot]:
-            terrain.voxel[slot] = voxel
-            terrain.bounds[slot] = math.inf
+    for height in range(terrain.voxel.shape[1]):
+        terrain.voxel[block, height] = _at_height(terrain, column, height) if column != NONE else NONE
 
 
 @lean_kernel
@@ -204,7 +189,7 @@ def fill_column_costs(terrain, cost, least):
     for column in range(len(least)):
         least[column] = math.inf
         if terrain.columns.flags[column] & CANDIDATE:
-            for height in range(_heights(terrain)):
+            for height in range(terrain.voxel.shape[1]):
                 voxel = _at_height(terrain, column, height)
                 if voxel != NONE:
                     least[column] = min(least[column], cost[voxel])

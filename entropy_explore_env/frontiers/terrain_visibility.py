@@ -4,6 +4,9 @@ Points are the columns of a TerrainMap. Unexplored ground is assumed to slope do
 of the ground around the place: z = (1 - dist / range) z_av above the workspace's floor. A column is seen if a
 ray from the place meets its top: along every direction the steepest slope to the columns passed is the
 horizon. Grid units: heights are in layers.
+
+In all functions `terrain` is the TerrainMap, `model` a ViewModel, `eye` a place (x, y, z) and `average` z_av
+there.
 """
 
 from __future__ import annotations
@@ -60,20 +63,20 @@ def height_at(terrain, x, y, eye, average, fade):
 
 
 @lean_kernel
-def count_below(counter, terrain, eye, average, azimuths, view_model, marking):
-    """Count the unexplored columns that are seen from a place: (all, weighed by promises).
+def count_below(counter, terrain, eye, average, azimuths, model, marking):
+    """Count the unexplored columns that are seen from a place; see `visibility`.
 
     Args:
-        counter: The counter.
-        terrain: The map.
-        eye: (x, y, z) of the place.
-        average: z_av there.
+        counter: A VisibilityCounter.
+        terrain: See the top of the file.
+        eye: See there.
+        average: See there.
         azimuths: (D, 2) float64 unit vectors.
-        view_model: Reach, min_tangent and fade matter.
-        marking: Whether the robot promises to see these columns.
+        model: See there.
+        marking: Whether one more robot promises to see these columns.
     """
     number, points, weighed = start_count(counter), 0, 0.0
-    size, reach = terrain.size, view_model.reach
+    size, reach = terrain.size, model.reach
     for direction in azimuths:
         x, y = int(eye[0]), int(eye[1])
         step_x, step_y = 1 if direction[0] > 0.0 else -1, 1 if direction[1] > 0.0 else -1
@@ -84,14 +87,13 @@ def count_below(counter, terrain, eye, average, azimuths, view_model, marking):
         enters, horizon = 0.0, -math.inf
         while enters <= reach:
             leaves = min(face_x, face_y)
-            height = height_at(terrain, x, y, eye, average, view_model.fade)
-            drop = eye[2] - height
+            drop = eye[2] - height_at(terrain, x, y, eye, average, model.fade)
             if drop <= 0.0:
                 break  # it hides the tops of all lower columns behind it
             slope = -drop / leaves
             column = x * size[1] + y
             near = enters * enters + drop * drop <= reach * reach
-            if slope > horizon and near and drop >= view_model.min_tangent * enters:
+            if slope > horizon and near and drop >= model.min_tangent * enters:
                 if terrain.columns.state[column] & UNEXPLORED and counter.stamp[column] != number:
                     counter.stamp[column] = number
                     points += 1
@@ -108,59 +110,44 @@ def count_below(counter, terrain, eye, average, azimuths, view_model, marking):
 
 
 @lean_kernel
-def count_columns_in_ball(counter, terrain, eye, average, view_model, marking):
+def count_columns_in_ball(counter, terrain, eye, average, model, marking):
     """Count the naive V: unexplored columns whose tops, extrapolated, lie in a ball, seen or not."""
-    points, weighed, size, reach = 0, 0.0, terrain.size, view_model.reach
-    wide = min(reach, size[0] + size[1])
-    for x in range(max(int(eye[0] - wide - 0.5), 0), min(int(eye[0] + wide + 1.0), size[0])):
-        for y in range(max(int(eye[1] - wide - 0.5), 0), min(int(eye[1] + wide + 1.0), size[1])):
+    points, weighed, size, reach = 0, 0.0, terrain.size, model.reach
+    for x in range(max(int(eye[0] - reach - 0.5), 0), min(int(eye[0] + reach + 1.0), size[0])):
+        for y in range(max(int(eye[1] - reach - 0.5), 0), min(int(eye[1] + reach + 1.0), size[1])):
             column = x * size[1] + y
-            if not terrain.columns.state[column] & UNEXPLORED:
-                continue
-            drop = eye[2] - height_at(terrain, x, y, eye, average, view_model.fade)
             dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]
-            if dx * dx + dy * dy + drop * drop <= reach * reach:
+            dz = eye[2] - height_at(terrain, x, y, eye, average, model.fade)
+            near = dx * dx + dy * dy + dz * dz <= reach * reach
+            if near and terrain.columns.state[column] & UNEXPLORED:
                 points += 1
                 weighed += count_point(counter, column, marking)
     return points, weighed
 
 
 @lean_kernel
-def count_columns_from(counter, terrain, voxels, azimuths, view_model, naive, seen, weighed):
-    """Count the columns seen from K voxels, times the height factor of each.
-
-    Args:
-        counter: The counter.
-        terrain: The map.
-        voxels: (K,) int32.
-        azimuths: (D, 2) float64.
-        view_model: How columns are seen.
-        naive: Whether columns in a ball are counted.
-        seen: (K,) filled in.
-        weighed: (K,) filled in, with columns weighed by promises.
-    """
+def count_columns_from(counter, terrain, voxels, azimuths, model, seen, weighed):
+    """Count the columns seen from (K,) int32 voxels into (K,) numbers and weights; see `count_below`."""
     for place in range(len(voxels)):
         x, y, z = grid_index(terrain.size, voxels[place])
-        eye, average = (x + 0.5, y + 0.5, z + 0.5), mean_ground(terrain, x, y, view_model.patch)
-        factor = height_factor(eye[2], average, view_model)
-        points, value = 0, 0.0
-        if factor > 0.0 and naive:
-            points, value = count_columns_in_ball(counter, terrain, eye, average, view_model, False)
-        elif factor > 0.0:
-            points, value = count_below(counter, terrain, eye, average, azimuths, view_model, False)
-        seen[place], weighed[place] = points * factor, value * factor
+        eye, average = (x + 0.5, y + 0.5, z + 0.5), mean_ground(terrain, x, y, model.patch)
+        found = count_below(counter, terrain, eye, average, azimuths, model, False)
+        seen[place], weighed[place] = found
 
 
-@inlined_kernel
-def height_factor(height, average, view_model):
-    """Return (z_f - z_av)^γ z_f^(1 - γ), heights above the workspace's floor in metres (sect. 3.3).
+@lean_kernel
+def fill_height_factors(terrain, voxels, model, factors):
+    """Fill in (z_f - z_av)^γ z_f^(1 - γ) of (K,) voxels, metres above the workspace's floor (sect. 3.3).
 
     It is 0 for places so high above the ground that little of it can be seen, which are no candidates.
     """
-    above, gamma = height - average, view_model.gamma
-    if above > view_model.highest:
-        return 0.0
-    return 1.0 if gamma < 0.0 else max(above, 1e-3) ** gamma * height ** (1.0 - gamma) * view_model.unit
+    gamma = model.gamma
+    for place in range(len(voxels)):
+        x, y, z = grid_index(terrain.size, voxels[place])
+        height = z + 0.5
+        above = height - mean_ground(terrain, x, y, model.patch)
+        factor = 1.0 if gamma < 0.0 else max(above, 1e-3) ** gamma * height ** (1.0 - gamma) * model.unit
+        factors[place] = 0.0 if above > model.highest else factor
 
 
 def half_widths(reach: float) -> np.ndarray:
@@ -173,25 +160,20 @@ def half_widths(reach: float) -> np.ndarray:
 
 
 @lean_kernel
-def bound_columns(terrain, sums, widths, voxels, view_model, bounds):
-    """Fill in the unexplored columns in range of K voxels, seen or not, times the height factors.
-
-    No more than this can be seen from there.
+def count_in_range(terrain, sums, widths, voxels, found):
+    """Fill in (K,) how many unexplored columns are in range of K voxels: no more can be seen from there.
 
     Args:
-        terrain: The map.
+        terrain: See the top of the file.
         sums: (X, Y + 1) int32, the unexplored columns of each row along y before a column.
         widths: (W,) of `half_widths`, for the sensor's reach.
         voxels: (K,) int32.
-        view_model: How columns are seen.
-        bounds: (K,) filled in.
+        found: (K,) filled in.
     """
     size, last = terrain.size, len(widths) - 1
     for place in range(len(voxels)):
-        x, y, z = grid_index(size, voxels[place])
-        found = 0
+        x, y, _ = grid_index(size, voxels[place])
+        found[place] = 0.0
         for i in range(max(x - last, 0), min(x + last, size[0] - 1) + 1):
             wide = widths[abs(i - x)]
-            found += sums[i, min(y + wide + 1, size[1])] - sums[i, max(y - wide, 0)]
-        average = mean_ground(terrain, x, y, view_model.patch)
-        bounds[place] = found * height_factor(z + 0.5, average, view_model)
+            found[place] += sums[i, min(y + wide + 1, size[1])] - sums[i, max(y - wide, 0)]

@@ -5,15 +5,12 @@ cannot stand in each of them. A frontier cell here is a voxel in which the body 
 touches one: its footprint meets a known free voxel beside an unknown one. For a point robot that is the
 textbook's frontier cell itself. Voxels lie in blocks. The cell nearest to the middle of its block stands for
 all of it in `listed`, the one with the shortest path in `nearest_of_blocks`.
-
-Counts are reused as upper bounds: while the map grows, no more unexplored voxels can be seen from a place
-than before. Only voxels that turn free may open new views, and those are added to the bounds.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
@@ -25,31 +22,25 @@ from entropy_explore_env.frontiers.blocks import (
     EXCLUDED,
     NONE,
     UNMAPPED,
-    queue_all_around,
+    new_blocks,
     replace_unreached,
 )
-from entropy_explore_env.frontiers.frontier_map import BATCH_CELLS, Chart, FrontierConfig, FrontierMap
+from entropy_explore_env.frontiers.frontier_map import BATCH_CELLS, FrontierConfig, FrontierMap
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.frontiers.ray_tree import grow_tree, imagined_pitches, rays_around, rays_towards
-from entropy_explore_env.frontiers.viewing_places import first_viewing_place
-from entropy_explore_env.frontiers.visibility import (
-    add_opened,
-    count_crossed,
-    count_from,
-    count_in_ball,
-    new_counter,
-)
+from entropy_explore_env.frontiers.visibility import count_crossed, count_from, count_in_ball, raise_bounds
 from entropy_explore_env.frontiers.voxel_map import (
-    box_around,
+    body_footprint,
     collect_candidates,
     count_connected,
     fill_nearest,
+    first_viewing_place,
     keep_unseen,
-    new_voxel_map,
     update_blocks,
     update_voxels,
-    voxels_in,
+    voxels_around,
 )
+from entropy_explore_env.frontiers.voxel_states import new_states
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import RobotKind
 
@@ -60,111 +51,81 @@ _MOST_OPENED = 256
 
 
 class VoxelFrontiers(FrontierMap):
-    """The frontier cells of one robot's belief; the points of V are voxels.
-
-    Attributes:
-        changed: How many voxels the latest update found in another state.
-    """
+    """The frontier cells of one robot's belief; the points of V are voxels."""
 
     def __init__(self, scenario: Scenario, kind: RobotKind, frontiers: FrontierConfig | None = None) -> None:
-        """Nothing is explored yet; without settings, blocks have an edge of BLOCK voxels."""
+        """Take the settings; without them, blocks have an edge of BLOCK voxels. Nothing is explored yet."""
         edge, layer = scenario.grid.voxel_size_m, scenario.layer_of(kind.robot)
         super().__init__(scenario, kind, frontiers or FrontierConfig(spacing_m=BLOCK * edge))
-        self._map = new_voxel_map(self._size, kind.robot.planning_radius_m / edge, layer, self._spacing)
-        self._states, self._blocks = self._map.states, self._map.blocks
-        self._costs, self._bounds = self._map.traversal_cost, self._map.bounds
+        self._states = new_states(self._size)
+        footprint = body_footprint(self._size, kind.robot.planning_radius_m / edge, layer)
+        self._blocks = new_blocks(self._size, self._states.state, footprint, layer, self._spacing)
+        self._costs = np.full(scenario.grid.voxels, np.inf, np.float32)
         self._voxels, self._marks = self._blocks.candidate, self._blocks.flags
-        self._counter = new_counter(scenario.grid.voxels, self._size)
+        self._start(scenario.grid.voxels)
         self._pitches = imagined_pitches(kind, layer is None)
-        self._directions = rays_around(self.reach, self._pitches)
-        self._tree = grow_tree(self._directions, self.reach, self._size)
-        self._met = np.empty(self._tree.cells, np.int32)
-        self.batch = 1 + BATCH_CELLS // self._tree.cells
+        self._rays = rays_around(self.reach, self._pitches)
+        self._tree = grow_tree(self._rays, self.reach, self._size)
+        self._gaze_pitches = (0.0, -0.7, 0.7) if layer is None else (0.0,)
+        self.batch = 1 + BATCH_CELLS // len(self._tree.after)
         self.point = edge ** (2 if scenario.grid.flat else 3)
         wide = self.reach + 2.0
         ball = math.pi * wide**2 if self._size[2] == 1 else 4.0 / 3.0 * math.pi * wide**3
         self._most = min(ball, float(scenario.grid.voxels))
-        """No more is seen from any place."""
-        self.changed, self.body_reach = 0, self._blocks.reach
         self._radius = self.body_reach + 2
         self._dropped: dict[int, tuple[bytes, np.ndarray]] = {}
         """Voxel → what its surroundings were when it was dropped, and which edges were dropped with it."""
 
     def update(self, view: RobotKnowledge, sigma: float) -> None:
         """See `FrontierMap`; dropped cells count again where the map has changed around them."""
-        mean, precision = view.mean.reshape(-1), view.precision.reshape(-1)
-        self.changed = int(update_voxels(self._map, mean, precision, self._levels(sigma)))
-        self._raise_bounds()
+        super().update(view, sigma)
         if self.changed:
             for voxel in [v for v, (was, _) in self._dropped.items() if self._surroundings(v) != was]:
                 self._restore(voxel)
 
-    def _raise_bounds(self) -> None:
-        """Add to the bounds what may be visible past voxels that turned free."""
-        count = int(self._states.noted_count[0])
-        self._states.noted_count[0] = 0
-        if count > _MOST_OPENED:
+    def _read(self, mean: np.ndarray, precision: np.ndarray, levels: tuple[np.float32, np.float32]) -> int:
+        """See `FrontierMap`."""
+        return int(update_voxels(self._states, self._blocks, self._costs, mean, precision, levels))
+
+    def _find_candidates(self) -> None:
+        """See `FrontierMap`."""
+        update_blocks(self._blocks, self._costs)
+
+    def replace_unreached(self, cost: np.ndarray) -> None:
+        """See `FrontierMap`."""
+        replace_unreached(self._blocks, cost)
+        self._forget_bounds()
+
+    def _raise_bounds(self, opened: np.ndarray) -> None:
+        """See `FrontierMap`."""
+        if self._naive or len(opened) > _MOST_OPENED:
             self._bounds[:] = math.inf
-        elif count > 0 and not self._naive:
-            arrays = self._states.noted[:count], self._voxels, self._tree, self._met
-            add_opened(self._counter, self._states.state, self._size, *arrays, self._bounds)
-
-    def mapped_share(self) -> float:
-        """See `FrontierMap`."""
-        return float((self._states.state & UNMAPPED == 0).mean())
-
-    def chart(self) -> Chart:
-        """See `FrontierMap`."""
-        layers = slice(None) if self._blocks.layer < 0 else slice(self._blocks.layer, self._blocks.layer + 1)
-        state, flags = (
-            array.reshape(self._size)[:, :, layers] for array in (self._states.state, self._marks)
-        )
-        marks = state & UNMAPPED == 0, state & COVERED > 0, flags & EDGE > 0
-        mapped, covered, edge = (np.asarray(mark.any(2)) for mark in marks)
-        return Chart(mapped, covered, edge, np.full(self._size[:2], np.nan))
-
-    def upper_bounds(self, slots: np.ndarray) -> np.ndarray:
-        """See `FrontierMap`."""
-        return np.minimum(self._bounds[slots], self._most)
-
-    def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
-        """See `FrontierMap`."""
-        self._bounds[slots], weighed = self._counted(voxels)
-        return weighed
+        else:
+            raise_bounds(self._size, opened, self._voxels, self._tree, self._bounds)
 
     def gains(self, voxels: np.ndarray) -> np.ndarray:
         """Return (K,) how many unknown voxels the sensor would see, all around, from (K,) int32 voxels."""
         return self._counted(voxels)[0]
 
-    def _counted(self, voxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return (K,) points that are seen from (K,) int32 voxels, and (K,) these weighed by promises."""
-        seen, weighed = np.empty(len(voxels)), np.empty(len(voxels))
-        arrays = self._counter, self._states.state, self._size
-        if self._naive:
-            for place, centre in enumerate(self._axes_of(voxels) + 0.5):
-                found = count_in_ball(*arrays, tuple(centre.tolist()), self.reach, False)
-                seen[place], weighed[place] = found
-        else:
-            count_from(*arrays, voxels, self._tree, self._met, seen, weighed)
-        return seen, weighed
-
-    def promise(self, place: np.ndarray) -> None:
+    def _count_from(self, voxels: np.ndarray, seen: np.ndarray, weighed: np.ndarray) -> None:
         """See `FrontierMap`."""
-        arrays = self._counter, self._states.state, self._size, tuple(place.tolist())
-        if self._naive:
-            count_in_ball(*arrays, self.reach, True)
-        else:
-            count_crossed(*arrays, self._directions, self.reach, True)
+        count_from(self._counter, self._states.state, self._size, voxels, self._tree, seen, weighed)
 
-    def _refresh(self, voxels: np.ndarray, radius: int) -> None:
+    def _count_rays(self, place: np.ndarray, rays: np.ndarray, marking: bool) -> tuple[int, float]:
         """See `FrontierMap`."""
-        update_blocks(self._map, queue_all_around(self._blocks, voxels, radius))
+        arrays, start = (self._counter, self._states.state, self._size), tuple(place.tolist())
+        return count_crossed(*arrays, start, rays, self.reach, marking)
 
-    def replace_unreached(self, cost: np.ndarray) -> None:
+    def _rays_ahead(self, view: RobotKnowledge, yaw: float, pitch: float) -> np.ndarray:
         """See `FrontierMap`."""
-        before = self._voxels.copy()
-        replace_unreached(self._blocks, cost)
-        self._bounds[self._voxels != before] = math.inf
+        turn, tilt = view.kind.sensor.field_of_view_rad
+        pitches = self._pitches if view.planar else np.linspace(pitch - tilt / 2, pitch + tilt / 2, 5)
+        return rays_towards(np.linspace(yaw - turn / 2, yaw + turn / 2, 24), pitches)
+
+    def _count_ball(self, place: np.ndarray, marking: bool) -> tuple[int, float]:
+        """See `FrontierMap`."""
+        arrays, start = (self._counter, self._states.state, self._size), tuple(place.tolist())
+        return count_in_ball(*arrays, start, self.reach, marking)
 
     def open_start(self, voxel: int) -> list[int]:
         """See `FrontierMap`."""
@@ -181,12 +142,7 @@ class VoxelFrontiers(FrontierMap):
         return bool(self._marks[voxel] & CANDIDATE)
 
     def opening(self, voxel: int, most: int) -> int:
-        """Return how many connected known free voxels beside unknown ones there are at a frontier cell.
-
-        Args:
-            voxel: The frontier cell.
-            most: No more are counted.
-        """
+        """Return how many connected free voxels beside unknown ones are at a frontier cell, up to `most`."""
         edges = self._edges_beside(voxel)
         found = np.concatenate([edges, np.empty(most, np.int64)])
         return int(count_connected(self._blocks, found, len(edges), most))
@@ -198,14 +154,12 @@ class VoxelFrontiers(FrontierMap):
             voxel: The frontier cell.
             radius: Largest distance along each axis, in voxels, from what the body touches in the cell.
         """
-        near = voxels_in(
-            box_around(self._size, voxel, radius + self.body_reach, self._blocks.layer), self._size
-        )
+        near = voxels_around(self._size, voxel, radius + self.body_reach, self._blocks.layer)
         return near[: keep_unseen(self._blocks, near)]
 
     def standing_around(self, voxel: int, radius: float) -> np.ndarray:
         """Return (K,) int32 voxels in which the body may stand, within a radius in voxel edges."""
-        near = voxels_in(box_around(self._size, voxel, int(radius), self._blocks.layer), self._size)
+        near = voxels_around(self._size, voxel, int(radius), self._blocks.layer)
         apart = ((self._axes_of(near) - self._axes_of(np.array(voxel))) ** 2).sum(1)
         return near[(apart <= radius * radius) & np.isfinite(self._costs[near])]
 
@@ -265,8 +219,7 @@ class VoxelFrontiers(FrontierMap):
 
     def _surroundings(self, voxel: int) -> bytes:
         """Return the states of the voxels around one."""
-        box = box_around(self._size, voxel, self._radius, -1)
-        return self._states.state.reshape(self._size)[box].tobytes()
+        return self._states.state[voxels_around(self._size, voxel, self._radius, -1)].tobytes()
 
     def _edges_beside(self, voxel: int) -> np.ndarray:
         """Return (N,) int64 voxels of the body's footprint in a voxel that lie beside unknown ones."""
@@ -278,17 +231,3 @@ class VoxelFrontiers(FrontierMap):
         places = self._axes_of(np.array(voxel)) + self._blocks.footprint
         places = places[((places >= 0) & (places < self._size)).all(1)]
         return np.asarray(np.ravel_multi_index(tuple(places.T), self._size))
-
-    def _gaze_pitches(self, view: RobotKnowledge) -> Sequence[float]:
-        """See `FrontierMap`."""
-        return (0.0,) if view.planar else (0.0, -0.7, 0.7)
-
-    def _points_ahead(
-        self, place: np.ndarray, view: RobotKnowledge, pitch: float, yaws: Sequence[float]
-    ) -> list[int]:
-        """See `FrontierMap`."""
-        turn, tilt = view.kind.sensor.field_of_view_rad
-        pitches = self._pitches if view.planar else np.linspace(pitch - tilt / 2, pitch + tilt / 2, 5)
-        arrays = self._counter, self._states.state, self._size, tuple(place.tolist())
-        fans = (rays_towards(np.linspace(yaw - turn / 2, yaw + turn / 2, 24), pitches) for yaw in yaws)
-        return [count_crossed(*arrays, rays, self.reach, False)[0] for rays in fans]

@@ -1,17 +1,18 @@
 """The frontier of a map of voxels, kept up to date as the belief changes.
 
 A body may stand where its whole footprint is mapped and believed free; the path search finds the connected
-part. Grid units; voxels by number, C order.
+part. Grid units; voxels by number, C order. `blocks` is the Blocks of the robot's voxels, `cost` the (V,)
+float32 traversal costs: 1 where the body may stand, else inf.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from entropy_explore_env.belief.paths.lattice import new_lattice
+from entropy_explore_env.belief.raycast import OPEN, Line, cast_range
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.frontiers.blocks import (
@@ -21,47 +22,23 @@ from entropy_explore_env.frontiers.blocks import (
     EDGE,
     EXCLUDED,
     NONE,
+    ROOM,
     UNEXPLORED,
     UNMAPPED,
-    Blocks,
     block_span,
     cell_at,
     choose_candidate,
+    mark_around,
     mark_edges,
-    new_blocks,
-    queue_around,
-    set_room,
+    set_flag,
     shares_face,
 )
-from entropy_explore_env.frontiers.voxel_states import VoxelStates, new_states, update_states
+from entropy_explore_env.frontiers.voxel_states import update_states
 
-
-class VoxelMap(NamedTuple):
-    """What is read off one robot's belief; V voxels in B blocks."""
-
-    states: VoxelStates
-    blocks: Blocks
-    traversal_cost: np.ndarray
-    """(V,) float32, 1 where the body may stand, else inf."""
-    bounds: np.ndarray
-    """(B,) float64, upper bound of the points that can be seen from a block's candidate; inf = unknown."""
-
-
-def new_voxel_map(
-    shape: tuple[int, int, int], body_radius: float, layer: int | None, spacing: int
-) -> VoxelMap:
-    """Return a map of which nothing is explored.
-
-    Args:
-        shape: (X, Y, Z) voxels.
-        body_radius: In voxel edges.
-        layer: The only one with candidates (planar robots); None = all.
-        spacing: Voxels along the edge of a block.
-    """
-    states = new_states(shape)
-    blocks = new_blocks(shape, states.state, body_footprint(shape, body_radius, layer), layer, spacing)
-    bounds = np.full(len(blocks.candidate), np.inf)
-    return VoxelMap(states, blocks, np.full(len(states.state), np.inf, np.float32), bounds)
+_KNOWN_FREE = 1
+"""States above this are unmapped or covered."""
+_SHORT = 1e-6
+"""Voxel edges by which a line ends before the face of the voxel that is looked at."""
 
 
 def body_footprint(shape: tuple[int, int, int], body_radius: float, layer: int | None) -> np.ndarray:
@@ -71,42 +48,37 @@ def body_footprint(shape: tuple[int, int, int], body_radius: float, layer: int |
 
 
 @lean_kernel
-def update_voxels(voxels, mean, precision, levels):
-    """Bring a VoxelMap up to date with a belief; arguments and result as of `update_states`."""
-    blocks, count = voxels.blocks, 0
-    changed = update_states(voxels.states, mean, precision, levels)
-    for place in range(changed):
-        voxel = voxels.states.changed[place]
+def update_voxels(states, blocks, cost, mean, precision, levels):
+    """Bring states, blocks and costs up to date with a belief; see `update_states`."""
+    changed = update_states(states, mean, precision, levels)
+    for voxel in states.changed[:changed]:
         z = grid_index(blocks.size, voxel)[2]
         if blocks.layer < 0 or abs(z - blocks.layer) <= blocks.reach + 2:
-            count = queue_around(blocks, voxel, blocks.reach + 2, count)
-    update_blocks(voxels, count)
+            mark_around(blocks, voxel, blocks.reach + 2)
+    update_blocks(blocks, cost)
     return changed
 
 
 @lean_kernel
-def update_blocks(voxels, count):
-    """Find the edge, the places to stand and the candidates of the first `count` queued blocks."""
-    blocks = voxels.blocks
-    mark_edges(blocks, count)
-    for place in range(count):
-        block = blocks.queued[place]
-        _find_room(voxels, block)
-        if choose_candidate(blocks, block):
-            voxels.bounds[block] = math.inf
+def update_blocks(blocks, cost):
+    """Find the edge, the places to stand and the candidates of the blocks that have to be updated."""
+    mark_edges(blocks)
+    for block in range(len(blocks.dirty)):
+        if blocks.dirty[block]:
+            _find_room(blocks, cost, block)
+            choose_candidate(blocks, block)
 
 
 @lean_kernel
-def _find_room(voxels, block):
+def _find_room(blocks, cost, block):
     """Set traversal costs and ROOM in a block."""
-    blocks = voxels.blocks
     low, high = block_span(blocks, block)
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
             for z in range(low[2], high[2]):
                 voxel, stands = flat_index(blocks.size, x, y, z), _may_stand(blocks, x, y, z)
-                voxels.traversal_cost[voxel] = 1.0 if stands else math.inf
-                set_room(blocks, voxel, stands and blocks.flags[voxel] & EXCLUDED == 0)
+                cost[voxel] = 1.0 if stands else math.inf
+                set_flag(blocks, voxel, ROOM, stands and blocks.flags[voxel] & EXCLUDED == 0)
 
 
 @lean_kernel
@@ -127,7 +99,7 @@ def collect_candidates(blocks, listed, found, of_block):
     """Fill in all candidates of (K,) int64 blocks one after the other; return how many there are.
 
     Args:
-        blocks: Of the robot.
+        blocks: See the top of the file.
         listed: The blocks.
         found: (N,) int32 voxels.
         of_block: (N,) int64, each one's block, as an index in `listed`.
@@ -160,7 +132,7 @@ def count_connected(blocks, found, count, most):
     """Return how many EDGE voxels are connected with some, by sides, edges or corners; at most `most`.
 
     Args:
-        blocks: Of the robot.
+        blocks: See the top of the file.
         found: (≥ most + count,) int64, the first `count` are filled in; the others are scratch space.
         count: How many the search begins with.
         most: Where counting ends.
@@ -201,15 +173,47 @@ def keep_unseen(blocks, voxels):
     return count
 
 
-def box_around(size: tuple[int, int, int], voxel: int, radius: int, layer: int) -> tuple[slice, ...]:
-    """Return slices of the voxels within a radius along every axis, in one layer or, with -1, in all."""
-    box = [
-        slice(max(int(at) - radius, 0), min(int(at) + radius + 1, n))
+@lean_kernel
+def first_viewing_place(blocks, places, voxels, reach):
+    """Return the index of the first of some places from which all of some voxels are visible; NONE = none.
+
+    Args:
+        blocks: See the top of the file.
+        places: (K,) int32 voxels.
+        voxels: (N,) int32; if there are none, they are visible from no place.
+        reach: How far off a voxel is visible at most, in voxel edges.
+    """
+    for number in range(len(places)):
+        all_visible = len(voxels) > 0
+        for voxel in voxels:
+            all_visible = all_visible and is_visible(blocks, places[number], voxel, reach)
+        if all_visible:
+            return number
+    return NONE
+
+
+@lean_kernel
+def is_visible(blocks, place, voxel, reach):
+    """Whether known free space leads from a voxel's centre straight to another's face, within reach."""
+    a, b = grid_index(blocks.size, place), grid_index(blocks.size, voxel)
+    x, y, z = float(b[0] - a[0]), float(b[1] - a[1]), float(b[2] - a[2])
+    length = math.sqrt(x * x + y * y + z * z)
+    if length > reach:
+        return False
+    until = length - 0.5 * length / max(abs(x), abs(y), abs(z), 1.0) - _SHORT  # where it enters the voxel
+    if until <= 0.0:
+        return True
+    start, direction = (a[0] + 0.5, a[1] + 0.5, a[2] + 0.5), (x / length, y / length, z / length)
+    _, _, end = cast_range(blocks.state, blocks.size, Line(start, direction, until), _KNOWN_FREE)
+    return end == OPEN
+
+
+def voxels_around(size: tuple[int, int, int], voxel: int, radius: int, layer: int) -> np.ndarray:
+    """Return (N,) int32 voxels within a radius along every axis, in one layer or, with -1, in all."""
+    ranges = [
+        np.arange(max(int(at) - radius, 0), min(int(at) + radius + 1, n))
         for at, n in zip(np.unravel_index(voxel, size), size, strict=True)
     ]
-    return (*box[:2], box[2] if layer < 0 else slice(layer, layer + 1))
-
-
-def voxels_in(box: tuple[slice, ...], size: tuple[int, int, int]) -> np.ndarray:
-    """Return (N,) int32 voxels of a box in C order."""
-    return np.asarray(np.ravel_multi_index(np.ogrid[box], size), np.int32).reshape(-1)
+    if layer >= 0:
+        ranges[2] = np.array([layer])
+    return np.ravel_multi_index(np.ix_(*ranges), size).astype(np.int32).reshape(-1)

@@ -25,14 +25,12 @@ class VoxelStates(NamedTuple):
     """(V,) uint8: UNEXPLORED, UNMAPPED, COVERED."""
     changed: np.ndarray
     """(V,) int32, the voxels that changed in the latest update come first."""
-    noted: np.ndarray
-    """(V + X·Y,) int32, the first `noted_count` are voxels past which more may be visible than before."""
-    noted_count: np.ndarray
-    """(1,) int64; set to 0 by those that have read the notes."""
+    opened: np.ndarray
+    """(V + X·Y,) int32, the first `opened_count` are voxels past which more may be visible than before."""
+    opened_count: np.ndarray
+    """(1,) int64; set to 0 by the reader."""
     sums: np.ndarray
-    """(V / _SUMMED,) uint64, sums of the bit patterns of precisions at the latest update."""
-    levels: np.ndarray
-    """(2,) float32, levels at the latest update; NaN = there was none."""
+    """(V / _SUMMED,) uint64, sums of the bit patterns of precisions at the latest update; 0 = look anew."""
     size: tuple[int, int, int]
 
 
@@ -42,10 +40,9 @@ def new_states(shape: tuple[int, int, int]) -> VoxelStates:
     return VoxelStates(
         state=np.full(voxels, UNEXPLORED | UNMAPPED, np.uint8),
         changed=np.zeros(voxels, np.int32),
-        noted=np.zeros(voxels + shape[0] * shape[1], np.int32),
-        noted_count=np.zeros(1, np.int64),
+        opened=np.zeros(voxels + shape[0] * shape[1], np.int32),
+        opened_count=np.zeros(1, np.int64),
         sums=np.zeros(math.ceil(voxels / _SUMMED), np.uint64),
-        levels=np.full(2, np.nan, np.float32),
         size=(int(shape[0]), int(shape[1]), int(shape[2])),
     )
 
@@ -59,10 +56,10 @@ def _state_of(mean, precision, levels):
 
 
 @inlined_kernel
-def note_more(states, voxel):
+def note_opened(states, voxel):
     """Note that more may be visible past a voxel than before."""
-    states.noted[states.noted_count[0]] = voxel
-    states.noted_count[0] += 1
+    states.opened[states.opened_count[0]] = voxel
+    states.opened_count[0] += 1
 
 
 @lean_kernel
@@ -74,22 +71,20 @@ def update_states(states, mean, precision, levels):
     float32 does not change the mean either.)
 
     Args:
-        states: Of the robot.
+        states: Of the robot; its sums are 0 where the levels are others than at the latest update.
         mean: (V,) float32, changed since the latest update only where the precision was raised.
-        precision: (V,) float32 1/σ², nowhere less than at the latest update.
+        precision: (V,) float32 1/σ² > 0, nowhere less than at the latest update.
         levels: (explored, mapped): precisions from which on a voxel is explored, and mapped.
 
     Returns:
         How many voxels are in another state than at the latest update.
     """
     state, count, bits = states.state, 0, precision.view(np.uint32)
-    as_before = states.levels[0] == levels[0] and states.levels[1] == levels[1]
-    states.levels[0], states.levels[1] = levels[0], levels[1]
     for first in range(0, len(state), _SUMMED):
         last, total = min(first + _SUMMED, len(state)), np.uint64(0)
         for voxel in range(first, last):
             total += np.uint64(bits[voxel])
-        if as_before and total == states.sums[first // _SUMMED]:
+        if total == states.sums[first // _SUMMED]:
             continue
         states.sums[first // _SUMMED] = total
         for voxel in range(first, last):
@@ -99,5 +94,5 @@ def update_states(states, mean, precision, levels):
                 states.changed[count] = voxel
                 count += 1
                 if before & COVERED > now & COVERED or before & UNEXPLORED < now & UNEXPLORED:
-                    note_more(states, voxel)
+                    note_opened(states, voxel)
     return count

@@ -1,1 +1,1 @@
-"""Drawing candidate viewpoints, and what scans from them should bring: by a robot's own belief."""
+"""What scans from viewpoints should bring, and how soon: by a robot's own belief."""

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from entropy_explore_env.belief.fields import entropy_gradient, remaining_entropy_gradient
-from entropy_explore_env.compilation.kernels import kernel, lean_kernel, record_type
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 
 CANDIDATE = record_type(
     [
@@ -41,17 +39,13 @@ def find_gradient_candidates(precision, known_precision, position, radius, layer
     Returns:
         How many there are.
     """
-    count, reach = 0, radius * (1.0 + _TOLERANCE)
-    size = precision.shape
-    first_k = max(math.floor(position[2] - reach), 0) if layer < 0 else layer
-    last_k = min(math.floor(position[2] + reach) + 1, size[2]) if layer < 0 else layer + 1
-    first_j = max(math.floor(position[1] - reach), 0)
-    last_j = min(math.floor(position[1] + reach) + 1, size[1])
-    for i in range(
-        max(math.floor(position[0] - reach), 0), min(math.floor(position[0] + reach) + 1, size[0])
-    ):
-        for j in range(first_j, last_j):
-            for k in range(first_k, last_k):
+    count, reach, size = 0, radius * (1.0 + _TOLERANCE), precision.shape
+    low_x, high_x = _span(position[0], reach, size[0])
+    low_y, high_y = _span(position[1], reach, size[1])
+    low_z, high_z = _span(position[2], reach, size[2]) if layer < 0 else (layer, layer + 1)
+    for i in range(low_x, high_x):
+        for j in range(low_y, high_y):
+            for k in range(low_z, high_z):
                 z = position[2] if layer >= 0 else k + 0.5
                 dx, dy, dz = i + 0.5 - position[0], j + 0.5 - position[1], z - position[2]
                 squared = dx * dx + dy * dy + dz * dz
@@ -72,17 +66,8 @@ def find_gradient_candidates(precision, known_precision, position, radius, layer
     return count
 
 
-@kernel
-def steepest_viewpoint(
-    mean: np.ndarray,
-    precision: np.ndarray,
-    position: np.ndarray,
-    yaw: float,
-    pitch: float,
-    reach: float,
-    projected: bool,
-    viewpoint: np.ndarray,
-) -> bool:
+@lean_kernel
+def steepest_viewpoint(mean, precision, position, yaw, pitch, reach, projected, viewpoint):
     """Choose among the voxels within reach (Rocha04, eqs. 32-34, or 38-40 if projected).
 
         free-flying:  argmax ‖∇h(l)‖ (1 - μ_l),                     gaze along ∇h
@@ -113,39 +98,41 @@ def steepest_viewpoint(
         for j in range(low_y, high_y):
             for k in range(low_z, high_z):
                 step = (i + 0.5 - position[0], j + 0.5 - position[1], k + 0.5 - position[2])
-                length = math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
+                length = _length(step)
                 if length > reach * (1.0 + _TOLERANCE):
                     continue
-                slope = entropy_gradient(precision, i, j, k, 1.0)
-                reachable = 1.0
+                slope, reachable = entropy_gradient(precision, i, j, k, 1.0), 1.0
                 if projected:
                     slope = _on_plane(slope, ahead, left)
                     if length > 0.0:
-                        step = _on_plane(step, ahead, left)
-                        reachable = math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2) / length
-                steepness = math.sqrt(slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2)
+                        reachable = _length(_on_plane(step, ahead, left)) / length
+                steepness = _length(slope)
                 score = reachable * steepness * (1.0 - mean[i, j, k])
                 if score > best:
                     best, found = score, True
                     viewpoint[0], viewpoint[1], viewpoint[2] = i + 0.5, j + 0.5, k + 0.5
-                    viewpoint[3] = (
-                        yaw if slope[0] == 0.0 and slope[1] == 0.0 else math.atan2(slope[1], slope[0])
-                    )
+                    viewpoint[3] = yaw
+                    if slope[0] != 0.0 or slope[1] != 0.0:
+                        viewpoint[3] = math.atan2(slope[1], slope[0])
                     viewpoint[4] = -math.asin(min(max(slope[2] / steepness, -1.0), 1.0))
     return found
 
 
-@kernel
-def _span(position: float, reach: float, size: int) -> tuple[int, int]:
-    """First and one past the last index along an axis whose voxel may be within reach."""
+@inlined_kernel
+def _span(position, reach, size):
+    """Return the first and one past the last index along an axis whose voxel may be within reach."""
     return max(math.floor(position - reach), 0), min(math.floor(position + reach) + 1, size)
 
 
-@kernel
-def _on_plane(
-    vector: tuple[float, float, float], ahead: tuple[float, float, float], left: tuple[float, float, float]
-) -> tuple[float, float, float]:
-    """Projection on the robot's motion plane (Rocha04, eq. 37)."""
+@inlined_kernel
+def _length(vector):
+    """Return the length of a vector (x, y, z)."""
+    return math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+
+
+@inlined_kernel
+def _on_plane(vector, ahead, left):
+    """Return the projection of (x, y, z) on the robot's motion plane (Rocha04, eq. 37)."""
     along = vector[0] * ahead[0] + vector[1] * ahead[1] + vector[2] * ahead[2]
     across = vector[0] * left[0] + vector[1] * left[1] + vector[2] * left[2]
     return (

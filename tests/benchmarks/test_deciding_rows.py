@@ -1,49 +1,39 @@
-"""The rows of decisions are measured, and what is measured is what strategies use."""
+"""Rows of decisions and missions are measured, of plans' files, too."""
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
+from PIL import Image
 
 from baselines.suites.bundled_worlds import WORLDS
-from benchmarks.deciding import candidates_row, decision_row, mutual_information_row, overlap_bits, plan_rows
+from benchmarks.deciding import decision_row, episodes_row, floor, floor_row, plan_rows, room_row, scanner_row
 from benchmarks.rows import Effort
-from entropy_explore_env.belief.visibility import CONE, cone_of
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.worlds.load import load_world
 
-TINY = Effort(rounds=2, steps=6)
+TINY = Effort(rounds=2, long_rounds=1, steps=6)
 
 
-def test_rows_are_measured():
-    overlap = mutual_information_row(TINY)
-    assert overlap.unit == "ms" and overlap.goal == "< 0.2 ms" and overlap.ours > 0
+def test_a_decision_is_measured():
     decision = decision_row(BOX, 2, "planned-rate", TINY.steps, 5.0)
+    assert decision.job == "a decision of planned-rate, box-7x11x5, 2 robots"
     assert decision.unit == "ms" and decision.goal == "< 5 ms" and decision.ours > 0
 
 
-def test_decisions_are_measured_in_a_plans_file():
-    world = WORLDS / "depot.npz"
-    rows = plan_rows("depot", str(world), load_world(world).grid, TINY.steps)
-    for row, name in zip(rows, ("depot", "depot to be seen whole"), strict=True):
+def test_a_plan_from_a_file_is_explored_at_its_own_resolution(tmp_path):
+    plan, path = np.full((40, 50), 255, np.uint8), tmp_path / "hall.png"
+    plan[:2] = plan[-2:] = plan[:, :2] = plan[:, -2:] = plan[:25, 22:26] = 0
+    Image.fromarray(plan).save(path)
+    *decisions, mission = plan_rows("hall", str(path), load_world(path), TINY)
+    for row, name in zip(decisions, ("hall", "hall to be seen whole"), strict=True):
         assert row.job == f"a decision of planned-rate, {name}, 1 robot" and row.goal == "< 50 ms"
         assert row.unit == "ms" and row.ours > 0
+    assert "in hall, 50 × 40 cells" in mission.job and 0.0 < mission.ours < 60.0 and mission.holds
 
 
-def test_candidates_are_proposed_beside_the_recommended_strategy():
-    row = candidates_row(BOX, 1, TINY)
-    assert row.peer == "planned-rate" and row.goal == "≥ 0.7 ×" and row.ratio is not None
-    assert row.theirs is not None and 0.0 < row.ours < 1e6 and row.theirs > 0.0
-
-
-def test_overlap_by_hand():
-    """The same cone twice shares all that it covers; cones that look away from each other nothing."""
-    size, precision, marks = (7, 11, 5), np.full(7 * 11 * 5, 0.25, np.float32), np.ones(7 * 11 * 5, np.uint8)
-    ahead, back = (cone_of(np.array([3.5, 5.5, 2.5, yaw, 0.0]), 3.0, 0.4) for yaw in (0.0, math.pi))
-    cones = np.zeros(2, CONE)
-    cones[0] = cones[1] = ahead
-    shared = overlap_bits(cones, size, precision, 1.0, marks)
-    assert shared == marks.sum() * 0.5 * math.log2(4.0) > 0
-    cones[1] = back
-    assert overlap_bits(cones, size, precision, 1.0, marks) in (0.0, math.log2(2.0))  # at most its apex
+def test_missions_a_scanner_and_episodes_are_measured():
+    scanner = scanner_row(TINY)
+    assert "720 rays" in scanner.job and scanner.goal == "≥ 5000 steps/s" and scanner.ours > 0.0
+    assert floor_row("a small floor", floor((90, 70, 1))).ours > 0.0
+    assert room_row("random", 1).unit == "s"
+    assert 50.0 < episodes_row(1).ours < 2000.0

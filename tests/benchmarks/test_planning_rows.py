@@ -14,7 +14,6 @@ from benchmarks.planning import (
     check_tessellation,
     cluttered,
     crossing_row,
-    iteration_row,
     maze,
     noise,
     rooms,
@@ -51,8 +50,6 @@ def test_rows_are_measured():
         assert name in voronoi.job
     crossing = crossing_row((201, 103, 1), TINY)
     assert crossing.unit == "ms" and crossing.goal == "< 50 ms" and crossing.ours > 0
-    iteration = iteration_row((160, 101, 1), TINY)
-    assert iteration.unit == "ms" and iteration.goal == "≤ 68 ms" and iteration.ours > 0
 
 
 def test_all_of_a_maze_and_of_rooms_is_connected():

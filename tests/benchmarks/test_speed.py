@@ -19,7 +19,7 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenarios import ROOM
 from entropy_explore_env.settings import Grid, RangeSensor
 
-TINY = Effort(scans=10, rounds=2, long_rounds=1, steps=4, batch_steps=2, batches=(1, 2), starts=1)
+TINY = Effort(scans=10, rounds=2, long_rounds=1, steps=4, missions=(1, 2), starts=1, large=False)
 BOX = Grid((7, 11, 5), 0.5, (1.0, -2.0, 0.25))
 FEW_RAYS = RangeSensor((math.pi / 6, math.pi / 12), math.pi / 36)
 KEYS = ["job", "peer", "ours", "theirs", "unit", "ratio", "goal", "holds"]
@@ -33,7 +33,7 @@ def measured(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Let the command find these rows instead of measuring."""
 
     def find(*rows: Row) -> None:
-        monkeypatch.setattr(speed, "JOBS", (("sums", lambda effort: list(rows)),))
+        monkeypatch.setattr(speed, "JOBS", {"sums": lambda effort: list(rows)})
 
     return find
 
@@ -67,7 +67,7 @@ def test_table_names_every_job_and_goal(measured, capsys, monkeypatch):
 
 def test_quick_measures_less(monkeypatch, capsys):
     efforts: list[Effort] = []
-    monkeypatch.setattr(speed, "JOBS", (("sums", lambda effort: efforts.append(effort) or [HELD]),))
+    monkeypatch.setattr(speed, "JOBS", {"sums": lambda effort: efforts.append(effort) or [HELD]})
     run("--quick", "--json")
     run("--json")
     assert efforts[0].rounds < efforts[1].rounds and efforts[0].scans < efforts[1].scans
@@ -127,7 +127,7 @@ def test_interruption_is_code_130_and_leaves_no_page(monkeypatch, capsys, tmp_pa
     def interrupt(effort: Effort) -> list[Row]:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(speed, "JOBS", (("sums", interrupt),))
+    monkeypatch.setattr(speed, "JOBS", {"sums": interrupt})
     assert run("--out", str(tmp_path / "speed.md")) == 130
     assert capsys.readouterr().out == "" and list(tmp_path.iterdir()) == []
 
@@ -204,24 +204,26 @@ def test_rows_of_a_grid_are_measured():
 
 def test_steps_are_measured_with_full_bursts(monkeypatch):
     monkeypatch.setattr(stepping, "LOOPED", 2)
-    (row,) = stepping.spread_rows(TINY)
-    assert row.ours > 0 and row.theirs and row.goal == "≥ 2 ×"
-    rows = stepping.vector_rows(TINY)
+    rows = stepping.step_rows(TINY)
+    assert [row.goal for row in rows] == ["≥ 2 ×", "≥ 0.869565 ×", None]
+    assert [row.peer for row in rows] == ["mpe2 simple_spread_v3, N = 4", "exact robots", "batches"]
+    assert all(row.ours > 0 and row.theirs for row in rows)
+    *rows, calls, belief = stepping.vector_rows(TINY)
     assert [row.goal for row in rows] == [None, "≥ 1.15 ×", "≥ 1.15 ×", "≥ 1.7 ×"]
     assert all(row.ours > 0 and row.theirs for row in rows)
+    assert calls.holds and (belief.ours, belief.goal, belief.holds) == (8.0, "= 8 bytes", True)
 
 
-def test_python_calls_and_memory_do_not_depend_on_the_missions():
-    few, more = stepping.Batch(2, 1), stepping.Batch(5, 1)
-    assert stepping.python_calls(few) == stepping.python_calls(more) > 0
-    row = stepping.memory_row(few)
-    assert (row.ours, row.goal, row.holds) == (8.0, "= 8 bytes", True)
+def test_steps_in_larger_worlds_are_measured(monkeypatch):
+    monkeypatch.setattr(stepping, "SHAPES", ((41, 41, 17), (60, 50, 20)))
+    (row,) = stepping.size_rows(TINY)
+    assert row.goal == "≤ 1.5 ×" and row.peer == "28,577 voxels" and row.ours > 0.0
 
 
 def test_bursts_that_are_not_full_are_no_measurement():
-    team = stepping.SingleTeam(stepping.TURNING)
-    team.env.reset(seed=0)
-    robots = team.env.missions.state.robots
+    (env,) = stepping.Team(stepping.TURNING).envs
+    env.reset(seed=0)
+    robots = env.missions.state.robots
     with pytest.raises(RuntimeError, match="bursts of 64"):
         stepping.check_bursts(robots, 64)
     robots["scans"], robots["measurements_sent"] = 10, 630
@@ -241,10 +243,10 @@ def test_first_step_of_a_fresh_process(monkeypatch):
 
 
 def test_only_what_is_asked_for_is_measured(monkeypatch, capsys):
-    jobs = (
-        ("sums of many", lambda effort: [HELD]),
-        ("products", lambda effort: pytest.fail("not asked for")),
-    )
+    jobs = {
+        "sums of many": lambda effort: [HELD],
+        "products": lambda effort: pytest.fail("not asked for"),
+    }
     monkeypatch.setattr(speed, "JOBS", jobs)
     assert speed.main(["--only", "many", "--json"]) == 0
     assert [row["job"] for row in json.loads(capsys.readouterr().out)["rows"]] == [HELD.job]

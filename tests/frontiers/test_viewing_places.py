@@ -14,21 +14,21 @@ from baselines.experiments.mission import run_mission
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
-from entropy_explore_env.frontiers.viewing_places import is_visible
+from entropy_explore_env.frontiers.voxel_map import is_visible
 from entropy_explore_env.planner.scene import Goal
 from entropy_explore_env.planner.shared_tour import SharedTour
 from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.robots.motion import MoveEnd
-from tests.baselines.strategies.explorers.scenes import (
+from tests.planner.scenes import (
     belief_of_plan,
     cell,
     random_plan,
     scenario_of,
     scene_of,
+    small_plan,
     varied,
 )
-from tests.baselines.strategies.explorers.test_missions import small_plan
 from tests.reference import explorers as reference
 from tests.reference.scenes import drawn, seeds
 

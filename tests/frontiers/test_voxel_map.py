@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.frontiers.blocks import CANDIDATE, COVERED, NONE, UNEXPLORED, UNMAPPED
-from entropy_explore_env.frontiers.voxel_map import new_voxel_map, update_voxels
+from entropy_explore_env.frontiers.blocks import (
+    CANDIDATE,
+    COVERED,
+    NONE,
+    UNEXPLORED,
+    UNMAPPED,
+    new_blocks,
+)
+from entropy_explore_env.frontiers.voxel_map import body_footprint, update_voxels
+from entropy_explore_env.frontiers.voxel_states import new_states
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 
@@ -28,8 +38,19 @@ def state_of(mean, precision, levels=LEVELS):
     return state | np.where((mean > 0.5) & (precision >= levels[1]), COVERED, 0)
 
 
+def new_voxel_map(shape, radius, layer, spacing):
+    """States, blocks and traversal costs of which nothing is explored."""
+    states = new_states(shape)
+    blocks = new_blocks(shape, states.state, body_footprint(shape, radius, layer), layer, spacing)
+    return SimpleNamespace(
+        states=states, blocks=blocks, traversal_cost=np.full(len(states.state), np.inf, np.float32)
+    )
+
+
 def updated(frontiers, mean, precision, levels=LEVELS):
-    update_voxels(frontiers, mean.reshape(-1), precision.reshape(-1), levels)
+    frontiers.states.sums[:] = 0  # the levels may be others
+    maps = frontiers.states, frontiers.blocks, frontiers.traversal_cost
+    return update_voxels(*maps, mean.reshape(-1), precision.reshape(-1), levels)
 
 
 @given(st.sampled_from(SHAPES), st.sampled_from([0.0, 1.0, 1.3]), st.integers(1, 4), seeds)
@@ -81,13 +102,10 @@ def test_a_corridor_by_hand():
     frontiers = new_voxel_map((9, 3, 1), 0.0, 0, 2)
     updated(frontiers, mean, precision)
     assert frontiers.blocks.candidate[frontiers.blocks.candidate != NONE].tolist() == [4 * 3 + 1]
-    frontiers.bounds[:] = 1.0
     precision[5:7] = 9.0
     updated(frontiers, mean, precision)
     block = np.flatnonzero(frontiers.blocks.candidate != NONE)
-    assert (
-        frontiers.blocks.candidate[block].tolist() == [6 * 3 + 1] and np.isinf(frontiers.bounds[block]).all()
-    )
+    assert frontiers.blocks.candidate[block].tolist() == [6 * 3 + 1]
     precision[:] = 9.0
     updated(frontiers, mean, precision)
     assert (frontiers.blocks.candidate == NONE).all()
@@ -98,11 +116,11 @@ def test_where_more_may_be_visible_is_noted_by_hand():
     mean, precision = np.full(12, 0.9, np.float32), np.full(12, 9.0, np.float32)
     voxels = new_voxel_map((4, 3, 1), 0.0, 0, 2)
     states = voxels.states
-    update_voxels(voxels, mean, precision, LEVELS)
-    assert states.noted_count[0] == 0
+    updated(voxels, mean, precision)
+    assert states.opened_count[0] == 0
     mean[7], precision[7] = 0.1, 10.0
-    update_voxels(voxels, mean, precision, LEVELS)
-    assert states.noted_count[0] == 1 and states.noted[0] == 7
-    states.noted_count[0] = 0
-    update_voxels(voxels, mean, precision, (np.float32(16.0), np.float32(1.0)))
-    assert states.noted[: states.noted_count[0]].tolist() == list(range(12))  # all is unexplored again
+    assert updated(voxels, mean, precision) == 1
+    assert states.opened_count[0] == 1 and states.opened[0] == 7
+    states.opened_count[0] = 0
+    updated(voxels, mean, precision, (np.float32(16.0), np.float32(1.0)))
+    assert states.opened[: states.opened_count[0]].tolist() == list(range(12))  # all is unexplored again

@@ -66,7 +66,7 @@ class Team(NamedTuple):
 
 @inlined_kernel
 def _fits(belief, footprint, place):
-    """Whether a body touches nothing believed covered, nor the boundary."""
+    """Return whether a body touches nothing believed covered, nor the boundary."""
     size = belief.size
     for offset in footprint:
         i, j, k = int(place[0]) + offset[0], int(place[1]) + offset[1], int(place[2]) + offset[2]
@@ -79,7 +79,7 @@ def _fits(belief, footprint, place):
 
 @lean_kernel
 def reachability(belief, body, end):
-    """ρ by the belief: 1 - max μ of the voxels on the straight line; 0 where the body would touch something.
+    """Return ρ: 1 - max μ of the voxels on the straight line; 0 where the body would touch something.
 
     The voxel at its end does not count. So an unknown voxel is worth as much as the known one before it:
     which of them has the gradient of a frontier depends only on the direction of the backward difference.
@@ -108,7 +108,7 @@ def reachability(belief, body, end):
 
 @inlined_kernel
 def _teammate_on_line(mates, begin, end, length):
-    """Whether a teammate stands or drives on a straight line."""
+    """Return whether a teammate stands or drives on a straight line."""
     if length <= 0.0:
         return False
     direction = ((end[0] - begin[0]) / length, (end[1] - begin[1]) / length, (end[2] - begin[2]) / length)
@@ -122,7 +122,7 @@ def _teammate_on_line(mates, begin, end, length):
 
 @lean_kernel
 def best_candidate(candidates, order, belief, body, team, cone, occlusion, factors):
-    """The candidate with the greatest value of eq. 13, of those whose gain is above 0.
+    """Return the candidate with the greatest value of eq. 13, of those whose gain is above 0.
 
     Candidates come in the order of their values for λ = ρ = η = 1: the first one whose bound is not above the
     best value so far ends the search, so that λ is computed for few of them.

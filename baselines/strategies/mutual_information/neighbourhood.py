@@ -116,7 +116,7 @@ class Neighbourhood:
         return np.array([*(origin + chosen["place"] * edge), chosen["yaw"], chosen["pitch"]])
 
     def _near(self, view: RobotKnowledge, position: np.ndarray, radius: float) -> np.ndarray:
-        """(K,) CANDIDATE with a gradient."""
+        """Return the (K,) CANDIDATE within a radius that have a gradient."""
         layer = view.scenario.layer_of(view.kind.robot)
         across = [min(2 * math.floor(radius) + 3, size) for size in view.mean.shape]
         most = across[0] * across[1] * (1 if layer is not None else across[2])
@@ -129,7 +129,7 @@ class Neighbourhood:
         return self._candidates[:count]
 
     def _order(self, candidates: np.ndarray, radius: float) -> np.ndarray:
-        """(K,) numbers of the candidates by the upper bound of their value, highest first; ties at random."""
+        """Return the (K,) candidates by the upper bound of their value, highest first; ties at random."""
         most = candidates["steepness"] / candidates["steepness"].max()
         if self.config.distance_cost > 0.0:
             most = most - self.config.distance_cost * candidates["distance"] / radius
@@ -140,7 +140,7 @@ class Neighbourhood:
         return Occlusion(view.mean.reshape(-1), *self._crossing) if self.config.occlusion else None
 
     def _own_cone(self, view: RobotKnowledge, depth: float) -> tuple[np.ndarray, float]:
-        """The robot's cone, without an apex yet, and ξ, which is relative to the bits that it could hold."""
+        """Return the robot's cone, without an apex yet, and ξ, a share of the bits that it could hold."""
         sensor = view.kind.sensor
         widest = 0.5 * sensor.angular_step_rad * math.hypot(sensor.columns - 1, sensor.rows - 1)
         cone = np.zeros(1, CONE)
@@ -152,7 +152,7 @@ class Neighbourhood:
         return cone[0], max(self.config.overlap_scale * voxels * self._unknown_bits, 1e-9)
 
     def _heard(self, view: RobotKnowledge) -> np.ndarray:
-        """(M,) MATE, the teammates that the robot has heard; marks the voxels of their cones."""
+        """Return the teammates that the robot has heard, (M,) MATE, and mark the voxels of their cones."""
         settings, grid = self.config, view.scenario.grid
         mates = [number for number, mate in view.teammates.items() if mate.heard_s >= 0.0]
         if not settings.coordinated or not mates:

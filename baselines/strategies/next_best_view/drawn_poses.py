@@ -15,7 +15,7 @@ from baselines.strategies.next_best_view.expected_view import (
     new_view,
     occupancy_map,
 )
-from baselines.strategies.next_best_view.pose_samples import drawn_poses, reachable_voxels
+from baselines.strategies.next_best_view.pose_samples import drawn_poses, pose_in, reachable_voxels
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, belief_of
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import FrontierRule
@@ -79,7 +79,7 @@ class DrawnPoses(FrontierRule):
         view, expectations = scene.view, self._expectations[scene.view.robot]
         expectations.visible = expectations.visible[:0]
         known = occupancy_map(belief_of(view), self._scenario.sigma_prior**-2, expectations.interest)
-        reachable = reachable_voxels(scene)
+        reachable = reachable_voxels(scene.cells.traversal_cost, scene.paths)
         free = reachable[known.occupancy[reachable] < _LARGEST_OCCUPANCY]
         if len(free) == 0:
             return NOWHERE
@@ -90,10 +90,7 @@ class DrawnPoses(FrontierRule):
         in_vain, expectations.measured = measured == expectations.measured, measured
         best = 0
         if not (in_vain and self.escapes):
-            poses = [
-                np.array([*self._centre(view, voxel), *gaze])
-                for voxel, gaze in zip(voxels.tolist(), gazes, strict=True)
-            ]
+            poses = [pose_in(view, voxel, *gaze) for voxel, gaze in zip(voxels.tolist(), gazes, strict=True)]
             best = self._best(scene, known, poses)
         yaw, pitch = gazes[best].tolist()
         return Goal(int(voxels[best]), int(voxels[best]), gaze=(yaw, pitch))

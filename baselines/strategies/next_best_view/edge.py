@@ -30,7 +30,7 @@ class Edge(NamedTuple):
 def find_edge(
     height: np.ndarray, here: tuple[int, int], threshold: float, closing: float, tolerance: float
 ) -> Edge:
-    """The edge of the plateau that a rover stands on.
+    """Return the edge of the plateau that a rover stands on.
 
     Args:
         height: (X, Y) completed heights.
@@ -49,12 +49,12 @@ def find_edge(
 
 
 def inside_polygon(polygon: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """(X, Y) bool, which columns have their middle in a polygon (M, 2) in columns."""
+    """Return (X, Y) bool, which columns have their middle in a polygon (M, 2) in columns."""
     return np.asarray(polygon2mask(shape, polygon - 0.5), bool)
 
 
 def behind_line(edge: Edge, here: tuple[int, int]) -> np.ndarray:
-    """(X, Y) bool, which columns lie on the rover's side of the straight line that fits the edge best.
+    """Return (X, Y) bool, which columns lie on the rover's side of the straight line that fits the edge best.
 
     The line is fitted by total least squares to the border where the workspace does not end; all columns
     where there is no such border.

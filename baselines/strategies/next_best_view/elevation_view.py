@@ -44,7 +44,7 @@ class Camera(NamedTuple):
 
 @inlined_kernel
 def normal_share(x):
-    """Φ(x) to 1e-7, by Abramowitz & Stegun 1964, eq. 26.2.17: faster than by `erfc`."""
+    """Return Φ(x) to 1e-7, by Abramowitz & Stegun 1964, eq. 26.2.17: faster than by `erfc`."""
     t = 1.0 / (1.0 + 0.2316419 * abs(x))
     tail = t * (0.319381530 + t * (-0.356563782 + t * (1.781477937 + t * (-1.821255978 + t * 1.330274429))))
     tail *= math.exp(-0.5 * x * x) * 0.3989422804014327
@@ -53,7 +53,7 @@ def normal_share(x):
 
 @lean_kernel
 def visibility(ground, camera, x, y):
-    """P_V of eq. 5: the probability that no column on the line to a camera hides the top of a column.
+    """Return P_V of eq. 5: the probability that no column on the line to a camera hides the top of a column.
 
     The ray's height above a column is that in the middle of its way over it. The column itself, and the
     camera's, hide nothing.
@@ -105,7 +105,7 @@ class View(NamedTuple):
 
 @inlined_kernel
 def view_from(camera, pose):
-    """The View of a camera from a pose (5,)."""
+    """Return the View of a camera from a pose (5,)."""
     low, high = pose[4] - camera.half_pitch, pose[4] + camera.half_pitch
     return View(
         math.cos(pose[3]),
@@ -119,7 +119,7 @@ def view_from(camera, pose):
 
 @inlined_kernel
 def in_view(view, pose, x, y, z):
-    """Whether a point lies in a View from a pose: in its yaw, pitch and reach, not straight below."""
+    """Return whether a point lies in a View from a pose: in its yaw, pitch and reach, not straight below."""
     along_x, along_y, below = x - pose[0], y - pose[1], pose[2] - z
     square = along_x * along_x + along_y * along_y
     if square + below * below > view.square_reach or square == 0.0:
@@ -132,14 +132,14 @@ def in_view(view, pose, x, y, z):
 
 @inlined_kernel
 def column_bits(seen):
-    """The entropy of P_V/2 in bits, 0 for P_V = 0 and 1 for P_V = 1."""
+    """Return the entropy of P_V/2 in bits, 0 for P_V = 0 and 1 for P_V = 1."""
     p = 0.5 * seen
     return 0.0 if p <= 0.0 else -(p * math.log2(p) + (1.0 - p) * math.log2(1.0 - p))
 
 
 @lean_kernel
 def fill_new_information(ground, camera, most, poses, bits):
-    """NI of eq. 3 for each of K poses, each column weighed by the interest in it.
+    """Fill in NI of eq. 3 for each of K poses, each column weighed by the interest in it.
 
     Args:
         ground: Ground.
@@ -164,7 +164,7 @@ def fill_new_information(ground, camera, most, poses, bits):
 
 @lean_kernel
 def fill_visibility(ground, camera, pose, seen):
-    """P_V of every column from one pose (5,), 0 outside the view; `seen` (X, Y) float64 is filled in."""
+    """Fill (X, Y) float64 `seen` with P_V of every column from one pose (5,), 0 outside the view."""
     view = view_from(camera, pose)
     seen[:] = 0.0
     low_x, high_x = _span(pose[0], camera.reach, seen.shape[0])

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from scipy.ndimage import distance_transform_edt
 
 from baselines.strategies.next_best_view.elevation_view import Camera, Ground, fill_visibility
 from baselines.strategies.next_best_view.expected_view import window_in_reach
-from baselines.strategies.next_best_view.plateau import safe_columns
 from entropy_explore_env.belief.elevation import ElevationMap, completed, elevation_map
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
 
@@ -25,6 +25,7 @@ _UNKNOWN_SIGMA = 1.0
 """Of heights that are not measured, in voxel edges."""
 _COMPLETION_M = 0.05
 """Precision of completed heights."""
+_HALF_DIAGONAL = 0.5 * math.sqrt(2.0)
 _MARGIN = 1.0
 """Columns that a rover keeps from those that may not carry it: at the edge a map can be a column wrong."""
 
@@ -53,16 +54,21 @@ def camera_of(view: RobotKnowledge) -> Camera:
 
 
 class GroundMap:
-    """What one rover keeps of the ground from one decision to the next.
+    """What one rover keeps of the ground from one decision to the next; paths lead over it.
 
     Attributes:
         known: Elevation map at the latest decision.
+        traversal_cost: (V,) float32, 1 where the rover may stand by it, else inf.
         interest: (X, Y) float64, eq. 9.
         looks: Scans that were chosen for what they should show, in order.
     """
 
+    body_reach = 0
+    """Voxels that the body extends beyond its own: columns are safe for all of it."""
+
     def __init__(self, view: RobotKnowledge) -> None:
         """Begin where a rover stands."""
+        self.traversal_cost = np.full(view.scenario.grid.voxels, np.float32(np.inf))
         shape = view.scenario.grid.shape[:2]
         self.known = _measured(view)
         self.interest = np.ones(shape)
@@ -77,8 +83,14 @@ class GroundMap:
         """(X, Y) P_V from the goal, of a look that is expected to show something."""
         self._stand(view)
 
-    def update(self, view: RobotKnowledge) -> ElevationMap:
-        """Bring the map up to date with a rover's belief; return the elevation map before."""
+    def update(self, view: RobotKnowledge, form: EdgeForm | None) -> ElevationMap:
+        """Bring the map up to date with a rover's belief; return the elevation map before.
+
+        Args:
+            view: Of the rover.
+            form: How the edge of its plateau is taken, behind which it stays; None = only what carries it
+                counts.
+        """
         before, self.known = self.known, _measured(view)
         self._stand(view)
         carrying = self.known.known | self._stood
@@ -88,16 +100,21 @@ class GroundMap:
             self._height_m[:] = heights[carrying].min()
         begin = self._height_m[window]
         self._height_m[window] = completed(heights[window], carrying[window], _COMPLETION_M, begin)
+        costs = self.traversal_cost.reshape(view.scenario.grid.shape)
+        layer = view.scenario.layer_of(view.kind.robot)
+        costs[:, :, layer] = np.where(self.safe(view, form), np.float32(1.0), np.float32(np.inf))
+        self.traversal_cost[voxel_of(view, view.pose)] = 1.0
         return before
 
-    def safe(self, view: RobotKnowledge, form: EdgeForm | None) -> np.ndarray:
-        """Return (X, Y) bool, in the middle of which columns the rover may stand.
+    def open_start(self, voxel: int) -> list[int]:
+        """Return no voxels: where a rover stands counts as safe."""
+        return []
 
-        Args:
-            view: Of the rover.
-            form: How the edge of its plateau is taken, behind which it stays; None = only what carries it
-                counts.
-        """
+    def close(self, voxels: list[int]) -> None:
+        """Change nothing; see `open_start`."""
+
+    def safe(self, view: RobotKnowledge, form: EdgeForm | None) -> np.ndarray:
+        """Return (X, Y) bool, in the middle of which columns the rover may stand; see `update`."""
         from baselines.strategies.next_best_view.edge import behind_line, find_edge, inside_polygon
 
         edge_m, window = view.scenario.grid.voxel_size_m, self._window
@@ -173,3 +190,14 @@ def _ground_m(view: RobotKnowledge) -> float:
     layer = view.scenario.ground_layer_of(view.kind.robot)
     assert layer is not None  # rules for rovers have checked it
     return float(view.scenario.grid.origin_m[2] + (layer + 1) * view.scenario.grid.voxel_size_m)
+
+
+def safe_columns(carrying: np.ndarray, body_radius: float) -> np.ndarray:
+    """Return (X, Y) bool, in the middle of which columns all of a body's circle is carried.
+
+    Args:
+        carrying: (X, Y) bool, which columns are known to carry the rover.
+        body_radius: In columns.
+    """
+    gaps = np.asarray(distance_transform_edt(np.pad(carrying, 1)))[1:-1, 1:-1]
+    return gaps >= body_radius + _HALF_DIAGONAL

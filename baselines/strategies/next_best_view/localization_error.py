@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge, belief_of, voxel_of
+from baselines.strategies.next_best_view.pose_samples import path_points
+from entropy_explore_env.frontiers.knowledge import RobotKnowledge, belief_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.viewpoints.expected_localization import Drive, Surveyor, growth_of_error
@@ -38,17 +39,5 @@ def localization_error(view: RobotKnowledge, paths: KnownPaths, pose: np.ndarray
         matrices=np.empty((2, 4, 4)),
     )
     since_m = view.since_scan_m if scan_every_m == sensor.scan_every_m else 0.0
-    drive = Drive(view.pose, _path_to(view, paths, pose), pose, float(since_m))
+    drive = Drive(view.pose, path_points(view, paths, pose), pose, float(since_m))
     return float(growth_of_error(view.covariance, surveyor, drive, view.depth_m, np.empty((4, 4))))
-
-
-def _path_to(view: RobotKnowledge, paths: KnownPaths, pose: np.ndarray) -> np.ndarray:
-    """Return (N, 3) points of the known path to a pose, pulled straight, in metres."""
-    grid, goal = view.scenario.grid, voxel_of(view, pose)
-    if goal == voxel_of(view, view.pose):
-        return pose[None, :3].copy()
-    start, end = (grid.in_grid_units(place)[:3] for place in (view.pose, pose))
-    if paths.lattice.layer >= 0:
-        end[2] = start[2]
-    corners = paths.corners_of(paths.route_to(goal), start, end)
-    return np.asarray(grid.origin_m) + corners * grid.voxel_size_m

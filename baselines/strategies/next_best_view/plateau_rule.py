@@ -10,14 +10,17 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
-from baselines.strategies.next_best_view.ground_map import EdgeForm, GroundMap, column_of
-from baselines.strategies.next_best_view.plateau import PlateauPaths
-from baselines.strategies.next_best_view.pose_samples import yaws_around
+from baselines.strategies.next_best_view.ground_map import EdgeForm, GroundMap
+from baselines.strategies.next_best_view.pose_samples import path_points, reachable_voxels, yaws_around
+from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge
+from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
+from entropy_explore_env.frontiers.path_lengths import KnownPaths
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.driver import Driver, Trail
 from entropy_explore_env.scenario import Scenario
 
@@ -32,7 +35,7 @@ class Rover:
     """What is kept of a rover from one decision to the next."""
 
     ground: GroundMap
-    paths: PlateauPaths
+    paths: KnownPaths
     first_yaws: list[float]
     """Looks around that are left to do."""
     goal: np.ndarray | None = None
@@ -50,7 +53,7 @@ class PlateauRule(Driver):
 
     @abstractmethod
     def pick(self, view: RobotKnowledge, ground: GroundMap, reachable: np.ndarray) -> np.ndarray:
-        """Return the pose (5,) to go to, map frame, in one of the reachable columns (X, Y) bool."""
+        """Return the pose (5,) to go to, map frame, in one of the (N,) reachable voxels."""
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission.
@@ -74,8 +77,11 @@ class PlateauRule(Driver):
         if view.robot not in self._rovers:
             turns = yaws_around(view.kind.sensor.field_of_view_rad[0])
             first_yaws = [view.pose[3] + turn for turn in turns]
-            paths = PlateauPaths(self._scenario.grid.shape[:2])
-            self._rovers[view.robot] = Rover(GroundMap(view), paths, first_yaws)
+            ground = GroundMap(view)
+            # Paths need of a map where a body fits, and how to leave where it does not.
+            cells = cast("VoxelFrontiers", ground)
+            paths = KnownPaths(self._scenario, view.kind, cells, new_search(self._scenario.grid.voxels))
+            self._rovers[view.robot] = Rover(ground, paths, first_yaws)
 
     def note_blocked(self, view: RobotKnowledge) -> None:
         """Choose anew."""
@@ -93,29 +99,22 @@ class PlateauRule(Driver):
 
     def decide(self, view: RobotKnowledge) -> np.ndarray:
         """Return the viewpoint on the way to the rule's goal; see `Driver`."""
-        rover, grid = self._rovers[view.robot], self._scenario.grid
+        rover = self._rovers[view.robot]
         if rover.first_yaws:
             return np.array([*view.pose[:3], rover.first_yaws.pop(), STEEP_RAD])
-        ground, before = rover.ground, rover.ground.update(view)
+        ground, before = rover.ground, rover.ground.update(view, self.edge)
         if rover.goal is not None and self._arrived(view, rover.goal):
             ground.learn(before, self.interest_decay)
             rover.goal = None
-        reachable = rover.paths.start(ground.safe(view, self.edge), column_of(view, view.pose))
-        if rover.goal is None or not reachable[column_of(view, rover.goal)]:
+        rover.paths.start(voxel_of(view, view.pose))
+        reachable = reachable_voxels(ground.traversal_cost, rover.paths)
+        if rover.goal is None or voxel_of(view, rover.goal) not in reachable:
             rover.goal = self.pick(view, ground, reachable)
         stop = rover.goal.copy()
-        here, there = (grid.in_grid_units(place)[:2] for place in (view.pose, rover.goal))
-        stop[:2] = np.asarray(grid.origin_m)[:2] + rover.paths.first_corner(here, there) * grid.voxel_size_m
+        stop[:2] = path_points(view, rover.paths, rover.goal)[0, :2]
         return stop
 
     def _arrived(self, view: RobotKnowledge, goal: np.ndarray) -> bool:
-        """Whether a drive to a goal has ended there."""
+        """Return whether a drive to a goal has ended there."""
         apart_m = float(np.linalg.norm(view.pose[:2] - goal[:2]))
         return not view.under_way and apart_m < _SAME_PLACE * self._scenario.grid.voxel_size_m
-
-
-def pose_at(view: RobotKnowledge, column: np.ndarray, yaw: float, pitch: float) -> np.ndarray:
-    """Return a rover's pose (5,), map frame, in the middle of a column (2,)."""
-    grid = view.scenario.grid
-    x, y = np.asarray(grid.origin_m)[:2] + (column + 0.5) * grid.voxel_size_m
-    return np.array([x, y, view.pose[2], yaw, pitch])

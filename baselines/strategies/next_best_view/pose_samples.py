@@ -1,4 +1,4 @@
-"""Poses that Sujan's rules choose among: places drawn with a gaze, or those of a raster, row by row."""
+"""Poses that Sujan's rules choose among, and the known paths that lead there."""
 
 from __future__ import annotations
 
@@ -6,32 +6,49 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.frontiers.blocks import NONE
-from entropy_explore_env.planner.scene import Scene
+from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
+from entropy_explore_env.frontiers.path_lengths import KnownPaths
 
 _NARROWEST_RAD = 0.1
 """Narrower views count as this wide where a robot looks all around."""
 
 
-def reachable_voxels(scene: Scene) -> np.ndarray:
-    """Return (N,) int32 voxels in which the body is known to fit, with a known free path there."""
-    scene.paths.extend(math.inf)
-    voxels = np.flatnonzero(np.isfinite(scene.cells.traversal_cost)).astype(np.int32)
-    return voxels[np.isfinite(scene.paths.lengths_to(voxels))]
+def reachable_voxels(traversal_cost: np.ndarray, paths: KnownPaths) -> np.ndarray:
+    """Return (N,) int32 voxels in which the body is known to fit, with a known free path there.
+
+    Args:
+        traversal_cost: (V,) inf where it is not.
+        paths: Whose latest search begins where the robot stands; it is extended.
+    """
+    paths.extend(math.inf)
+    voxels = np.flatnonzero(np.isfinite(traversal_cost)).astype(np.int32)
+    return voxels[np.isfinite(paths.lengths_to(voxels))]
+
+
+def path_points(view: RobotKnowledge, paths: KnownPaths, pose: np.ndarray) -> np.ndarray:
+    """Return (N, 3) points of the known path to a pose by the latest search, pulled straight, map frame."""
+    grid, goal = view.scenario.grid, voxel_of(view, pose)
+    if goal == voxel_of(view, view.pose):
+        return pose[None, :3].copy()
+    start, end = (grid.in_grid_units(place)[:3] for place in (view.pose, pose))
+    if paths.lattice.layer >= 0:
+        end[2] = start[2]
+    corners = paths.corners_of(paths.route_to(goal), start, end)
+    return np.asarray(grid.origin_m) + corners * grid.voxel_size_m
 
 
 def drawn_poses(
-    rng: np.random.Generator, places: np.ndarray, number: int, pitches_rad: tuple[float, float]
+    rng: np.random.Generator, voxels: np.ndarray, number: int, pitches_rad: tuple[float, float]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Draw poses uniformly: their places, and (number, 2) yaws and pitches.
+    """Draw poses uniformly: their voxels, and (number, 2) yaws and pitches.
 
     Args:
         rng: Draws them.
-        places: (N, ...) each as likely as any other.
+        voxels: (N,) each as likely as any other.
         number: Of poses.
         pitches_rad: The lowest and the highest; yaws lie all around.
     """
-    drawn = places[rng.integers(len(places), size=number)]
+    drawn = voxels[rng.integers(len(voxels), size=number)]
     yaws = rng.uniform(-math.pi, math.pi, number)
     return drawn, np.stack([yaws, rng.uniform(*pitches_rad, number)], axis=1)
 
@@ -42,33 +59,10 @@ def yaws_around(wide_rad: float) -> list[float]:
     return [2.0 * math.pi * turn / turns for turn in range(turns)]
 
 
-def raster_rows(places: np.ndarray, step: int, size: tuple[int, ...]) -> np.ndarray:
-    """Return which of some places lie on a lattice, in row order: along x, then y, then z.
-
-    Args:
-        places: (N, D) indices along D axes.
-        step: Of the lattice, whose first place is half a step from the lower corner.
-        size: (D,) number of indices along each axis.
-    """
-    first = np.minimum(step // 2, np.array(size) - 1)
-    on_it = np.flatnonzero((places % step == first).all(axis=1))
-    return on_it[np.lexsort(places[on_it].T)]
-
-
-def next_of_raster(taken: dict[int, int], places: list[int], scans: int) -> int:
-    """Return the next place of a raster that a robot scans from, and count that scan.
-
-    Args:
-        taken: Place → scans chosen there, those that were stopped on the way included; changed.
-        places: That can be reached, in row order.
-        scans: From each place, one after the other.
-
-    Returns:
-        A place; NONE = all scans are taken.
-    """
-    latest = [place for place in list(taken)[-1:] if place in places]
-    for place in [*latest, *places]:
-        if taken.get(place, 0) < scans:
-            taken[place] = taken.get(place, 0) + 1
-            return place
-    return NONE
+def pose_in(view: RobotKnowledge, voxel: int, yaw: float, pitch: float) -> np.ndarray:
+    """Return the pose (5,) in the middle of a voxel, map frame; planar robots stay at their height."""
+    grid = view.scenario.grid
+    place = grid.centre_of(np.stack(np.unravel_index(voxel, grid.shape)))
+    if view.planar:
+        place[2] = view.pose[2]
+    return np.array([*place, yaw, pitch])

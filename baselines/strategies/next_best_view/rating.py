@@ -1,4 +1,4 @@
-"""New information in a view, and the rating function (Sujan, eqs. 6-8, 22-23)."""
+"""New information in a view, and the distance of a pose (Sujan, eqs. 6-8 and 22)."""
 
 from __future__ import annotations
 
@@ -39,14 +39,3 @@ def pose_distance(pose: np.ndarray, viewpoint: np.ndarray) -> float:
     apart = viewpoint - pose
     apart[3] = (apart[3] + math.pi) % (2.0 * math.pi) - math.pi
     return float(np.linalg.norm(apart))
-
-
-def rating(information_bits: float, costs_bits: float, occupancy: float) -> float:
-    """Return RF of eq. 23 with w_NI = 1.
-
-    Args:
-        information_bits: NI.
-        costs_bits: w_d·d + w_LE·LE.
-        occupancy: Probability that the place is occupied.
-    """
-    return (information_bits - costs_bits) * (1.0 - occupancy)

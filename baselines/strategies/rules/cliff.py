@@ -13,17 +13,17 @@ Ours: poses are drawn uniformly and look down by up to 60°.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import get_args
 
 import numpy as np
 
 from baselines.strategies.next_best_view.elevation_view import fill_new_information
 from baselines.strategies.next_best_view.ground_map import EdgeForm, GroundMap, camera_of
-from baselines.strategies.next_best_view.plateau_rule import STEEP_RAD, PlateauRule, pose_at
-from baselines.strategies.next_best_view.pose_samples import drawn_poses
-from baselines.strategies.next_best_view.rating import pose_distance, rating
+from baselines.strategies.next_best_view.plateau_rule import STEEP_RAD, PlateauRule
+from baselines.strategies.next_best_view.pose_samples import drawn_poses, pose_in
+from baselines.strategies.next_best_view.rating import pose_distance
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
-from entropy_explore_env.validation import check_choice, check_within
 
 _POSES = 100
 """m, drawn at each decision."""
@@ -33,51 +33,37 @@ _MOST_MEASUREMENTS = 4.0
 """n_max of eq. 3."""
 
 
-@dataclass(frozen=True)
-class CliffConfig:
-    """How a next best view is chosen above a cliff.
-
-    Attributes:
-        edge: Whether poses lie behind the straight `line` that fits the edge best, or in its `polygon`.
-        interest_decay: β of eq. 9; 0 = no interest is lost.
-
-    Raises:
-        SettingError: One of them is not allowed.
-    """
-
-    edge: EdgeForm = "polygon"
-    interest_decay: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_choice(self, "edge", EdgeForm)
-        check_within(self, "interest_decay", least=0.0, most=1e6)
-
-
 class CliffNextBestView(PlateauRule):
     """Goes to the pose on the plateau with the best rating."""
 
     rule = "cliff-next-best-view"
 
-    def __init__(self, config: CliffConfig | None = None) -> None:
-        """Take the settings; None = the defaults, method 5."""
-        config = config or CliffConfig()
-        self.edge, self.interest_decay = config.edge, config.interest_decay
+    def __init__(self, edge: EdgeForm = "polygon", interest_decay: float = 1.0) -> None:
+        """Take the method; the defaults are method 5.
+
+        Args:
+            edge: Whether poses lie behind the straight `line` that fits the edge best, or in its `polygon`.
+            interest_decay: β of eq. 9; 0 = no interest is lost.
+
+        Raises:
+            SettingError: One of them is not allowed.
+        """
+        if edge not in get_args(EdgeForm):
+            raise SettingError("edge", edge, f"one of {', '.join(get_args(EdgeForm))}")
+        if not 0.0 <= interest_decay <= 1e6:
+            raise SettingError("interest_decay", interest_decay, "a number from 0 to 1e6")
+        self.edge, self.interest_decay = edge, interest_decay
 
     def pick(self, view: RobotKnowledge, ground: GroundMap, reachable: np.ndarray) -> np.ndarray:
         """Return the best rated of the poses drawn; see `PlateauRule`."""
-        grid = self._scenario.grid
-        columns, gazes = drawn_poses(self._rng, np.argwhere(reachable), _POSES, (0.0, STEEP_RAD))
+        voxels, gazes = drawn_poses(self._rng, reachable, _POSES, (0.0, STEEP_RAD))
         poses = [
-            pose_at(view, column, yaw, pitch)
-            for column, (yaw, pitch) in zip(columns, gazes.tolist(), strict=True)
+            pose_in(view, voxel, yaw, pitch)
+            for voxel, (yaw, pitch) in zip(voxels.tolist(), gazes.tolist(), strict=True)
         ]
-        scaled, bits = np.stack([grid.in_grid_units(pose) for pose in poses]), np.empty(_POSES)
+        scaled, bits = np.stack([view.scenario.grid.in_grid_units(pose) for pose in poses]), np.empty(_POSES)
         fill_new_information(ground.ground(view), camera_of(view), _MOST_MEASUREMENTS, scaled, bits)
-        worth = [
-            rating(new, _DISTANCE_WEIGHT * pose_distance(view.pose, pose), 0.0)
-            for new, pose in zip(bits.tolist(), poses, strict=True)
-        ]
-        best = int(np.argmax(worth))
+        distances = np.array([pose_distance(view.pose, pose) for pose in poses])
+        best = int(np.argmax(bits - _DISTANCE_WEIGHT * distances))
         ground.expect(view, scaled[best])
         return poses[best]

@@ -13,8 +13,9 @@ import math
 import numpy as np
 
 from baselines.strategies.next_best_view.ground_map import GroundMap
-from baselines.strategies.next_best_view.plateau_rule import PlateauRule, pose_at
-from baselines.strategies.next_best_view.pose_samples import next_of_raster, raster_rows, yaws_around
+from baselines.strategies.next_best_view.plateau_rule import PlateauRule
+from baselines.strategies.next_best_view.pose_samples import pose_in
+from baselines.strategies.rules.raster import RasterScan
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.scenario import Scenario
@@ -31,27 +32,15 @@ class CliffRaster(PlateauRule):
     rule = "cliff-raster"
 
     def __init__(self, turning: bool = True) -> None:
-        """Take the method.
-
-        Args:
-            turning: Whether rovers look in all directions from each place, or always along x.
-        """
+        """Take whether rovers look in all directions from each place, or always along x."""
         self._turning = turning
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
         super().reset(scenario, rng)
-        self._taken: dict[int, dict[int, int]] = {robot: {} for robot in range(scenario.robots)}
-        """Robot → number of a column → how many looks it has chosen there."""
+        self._scans = [RasterScan(self._turning) for _ in range(scenario.robots)]
 
     def pick(self, view: RobotKnowledge, ground: GroundMap, reachable: np.ndarray) -> np.ndarray:
         """Return the next place and gaze, the rover's own where none is left; see `PlateauRule`."""
-        yaws = yaws_around(view.kind.sensor.field_of_view_rad[0]) if self._turning else [0.0]
-        step = max(round(_SPACING_M / self._scenario.grid.voxel_size_m), 1)
-        columns, taken = np.argwhere(reachable), self._taken[view.robot]
-        places = np.flatnonzero(reachable)[raster_rows(columns, step, reachable.shape)].tolist()
-        place = next_of_raster(taken, places, len(yaws))
-        if place == NONE:
-            return view.pose.copy()
-        column = np.array(np.unravel_index(place, reachable.shape))
-        return pose_at(view, column, yaws[taken[place] - 1], _AHEAD_RAD)
+        voxel, yaw = self._scans[view.robot].next_scan(view, reachable, _SPACING_M)
+        return view.pose.copy() if voxel == NONE else pose_in(view, voxel, yaw, _AHEAD_RAD)

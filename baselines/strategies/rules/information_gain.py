@@ -49,7 +49,7 @@ class InformationGain(FrontierRule):
     def _worths(
         self, scene: Scene, slots: np.ndarray, voxels: np.ndarray, lengths: np.ndarray, bounds: np.ndarray
     ) -> np.ndarray:
-        """(K,) worths, as far as it takes to know the greatest; -inf for cells that cannot have it."""
+        """Return (K,) worths, as far as it takes to know the greatest; -inf for cells that cannot have it."""
         weight = self.weight * scene.cells.reach
         bound = weight * np.log1p(bounds) - lengths
         order, size = np.argsort(-bound, kind="stable"), scene.cells.batch

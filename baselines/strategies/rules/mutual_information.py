@@ -81,7 +81,7 @@ class MutualInformation(Driver):
 
 
 def _alike(one: np.ndarray, other: np.ndarray, voxel_size_m: float) -> bool:
-    """Whether two viewpoints are less than a voxel and 15° apart."""
+    """Return whether two viewpoints are less than a voxel and 15° apart."""
     turn = abs((one[3] - other[3] + math.pi) % (2.0 * math.pi) - math.pi)
     near = float(np.abs(one[:3] - other[:3]).max()) < voxel_size_m
     return near and max(turn, abs(one[4] - other[4])) < _ALIKE_RAD

@@ -25,7 +25,7 @@ import numpy as np
 from baselines.strategies.next_best_view.drawn_poses import DrawnPoses
 from baselines.strategies.next_best_view.expected_view import OccupancyMap, voxels_in_view
 from baselines.strategies.next_best_view.localization_error import localization_error
-from baselines.strategies.next_best_view.rating import UNCERTAINTY, new_information, pose_distance, rating
+from baselines.strategies.next_best_view.rating import UNCERTAINTY, new_information, pose_distance
 from entropy_explore_env.frontiers.knowledge import voxel_of
 from entropy_explore_env.planner.scene import Scene
 from entropy_explore_env.validation import check_choice, check_count, check_kind, check_within
@@ -86,4 +86,4 @@ class NextBestView(DrawnPoses):
         costs = config.distance_weight * pose_distance(view.pose, pose)
         if config.error_weight > 0.0:
             costs += config.error_weight * localization_error(view, scene.paths, pose)
-        return rating(bits, costs, float(known.occupancy[voxel_of(view, pose)]))
+        return (bits - costs) * (1.0 - float(known.occupancy[voxel_of(view, pose)]))

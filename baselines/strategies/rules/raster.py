@@ -13,12 +13,7 @@ import math
 
 import numpy as np
 
-from baselines.strategies.next_best_view.pose_samples import (
-    next_of_raster,
-    raster_rows,
-    reachable_voxels,
-    yaws_around,
-)
+from baselines.strategies.next_best_view.pose_samples import reachable_voxels, yaws_around
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
@@ -31,6 +26,51 @@ _SPACING = 0.5
 """Between places, in sensor ranges; without range limit, in tenths of the workspace's longest side."""
 
 
+class RasterScan:
+    """The scans of a raster that a robot has chosen, those that were stopped on the way included."""
+
+    def __init__(self, turning: bool) -> None:
+        """Begin; with `turning` it looks in all directions from each place, else along x."""
+        self._turning = turning
+        self._taken: dict[int, int] = {}
+        """Place → number of scans chosen there."""
+
+    def next_scan(self, view: RobotKnowledge, voxels: np.ndarray, spacing_m: float) -> tuple[int, float]:
+        """Return the next place, a voxel, and the yaw there; NONE where all scans are taken.
+
+        Args:
+            view: Of the robot.
+            voxels: (N,) int32 that it can reach.
+            spacing_m: Between places.
+        """
+        grid = view.scenario.grid
+        yaws = yaws_around(view.kind.sensor.field_of_view_rad[0]) if self._turning else [0.0]
+        axes = 3 if view.scenario.layer_of(view.kind.robot) is None else 2
+        places = np.stack(np.unravel_index(voxels, grid.shape), axis=-1)[:, :axes]
+        rows = raster_rows(places, max(round(spacing_m / grid.voxel_size_m), 1), grid.shape[:axes])
+        reachable = voxels[rows].tolist()
+        latest = [place for place in list(self._taken)[-1:] if place in reachable]
+        for place in [*latest, *reachable]:
+            scans = self._taken.get(place, 0)
+            if scans < len(yaws):
+                self._taken[place] = scans + 1
+                return place, yaws[scans]
+        return NONE, 0.0
+
+
+def raster_rows(places: np.ndarray, step: int, size: tuple[int, ...]) -> np.ndarray:
+    """Return which of some places lie on a lattice, in row order: along x, then y, then z.
+
+    Args:
+        places: (N, D) indices along D axes.
+        step: Of the lattice, whose first place is half a step from the lower corner.
+        size: (D,) number of indices along each axis.
+    """
+    first = np.minimum(step // 2, np.array(size) - 1)
+    on_it = np.flatnonzero((places % step == first).all(axis=1))
+    return on_it[np.lexsort(places[on_it].T)]
+
+
 class Raster(FrontierRule):
     """Scans from the places of a lattice, row by row, each as soon as it is known to be free."""
 
@@ -38,37 +78,23 @@ class Raster(FrontierRule):
     until_reached, refines, turns_first = True, False, False
 
     def __init__(self, turning: bool = True) -> None:
-        """Take the method.
-
-        Args:
-            turning: Whether robots look in all directions from each place, or always along x.
-        """
+        """Take whether robots look in all directions from each place, or always along x."""
         self._turning = turning
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
         super().reset(scenario, rng)
-        self._taken: dict[int, dict[int, int]] = {robot: {} for robot in range(scenario.robots)}
-        """Robot → voxel → how many scans it has chosen there."""
+        self._scans = [RasterScan(self._turning) for _ in range(scenario.robots)]
 
     def pick(self, scene: Scene) -> Goal:
         """Return the next place and gaze; see `FrontierRule`."""
-        view = scene.view
-        yaws = yaws_around(view.kind.sensor.field_of_view_rad[0]) if self._turning else [0.0]
-        taken = self._taken[view.robot]
-        voxel = next_of_raster(taken, self._places(view.kind, reachable_voxels(scene)), len(yaws))
-        if voxel == NONE:
-            return NOWHERE
-        return Goal(voxel, voxel, gaze=(yaws[taken[voxel] - 1], 0.0))
+        view, voxels = scene.view, reachable_voxels(scene.cells.traversal_cost, scene.paths)
+        voxel, yaw = self._scans[view.robot].next_scan(view, voxels, self._spacing_m(view.kind))
+        return NOWHERE if voxel == NONE else Goal(voxel, voxel, gaze=(yaw, 0.0))
 
     def arrive(self, view: RobotKnowledge, cells: VoxelFrontiers, here: int) -> None:
         """Learn nothing: the next gaze is the raster's."""
 
-    def _places(self, kind: RobotKind, reachable: np.ndarray) -> list[int]:
-        """Return the lattice's places among (N,) reachable voxels, in row order."""
-        grid, range_m = self._scenario.grid, kind.sensor.max_range_m
-        unit_m = 0.1 * max(grid.size_m) if math.isinf(range_m) else range_m
-        step = max(round(_SPACING * unit_m / grid.voxel_size_m), 1)
-        axes = 3 if self._scenario.layer_of(kind.robot) is None else 2
-        indices = np.stack(np.unravel_index(reachable, grid.shape), axis=-1)[:, :axes]
-        return reachable[raster_rows(indices, step, grid.shape[:axes])].tolist()
+    def _spacing_m(self, kind: RobotKind) -> float:
+        range_m = kind.sensor.max_range_m
+        return _SPACING * (0.1 * max(self._scenario.grid.size_m) if math.isinf(range_m) else range_m)

@@ -48,12 +48,12 @@ class Tree:
         self.parents.append(parent)
         self.places.append(place)
 
-    def branch_to(self, last: int) -> list[np.ndarray]:
-        """Return the places of the branch that ends in a place, without the root."""
+    def branch_to(self, last: int) -> list[int]:
+        """Return the numbers of the places of the branch that ends in a place, without the root."""
         branch = [last]
         while self.parents[branch[-1]] != 0:
             branch.append(self.parents[branch[-1]])
-        return [self.places[place] for place in reversed(branch)]
+        return branch[::-1]
 
 
 class RecedingHorizon(FrontierRule):
@@ -81,10 +81,13 @@ class RecedingHorizon(FrontierRule):
         free = scene.free_around(max(int(_AROUND * scene.cells.reach), 1))
         for size in _SIZES:
             self._grow(scene, tree, free, size)
-            worth = _gains(scene, tree, scanned)
+            indices = np.array(tree.places).astype(int)
+            voxels = np.ravel_multi_index(tuple(indices.T), scene.view.scenario.grid.shape).astype(np.int32)
+            worth = _gains(scene, tree, voxels, scanned)
             if worth.max() >= _LEAST_GAIN:
-                first, *self._branches[robot] = tree.branch_to(int(np.argmax(worth)))
-                return _voxel(scene, first)
+                first, *rest = tree.branch_to(int(np.argmax(worth)))
+                self._branches[robot] = [tree.places[place] for place in rest]
+                return int(voxels[first])
         self._branches[robot] = []
         voxels, lengths = scene.paths.nearest_frontiers()
         return best_of(voxels, -lengths, scene.target)
@@ -105,17 +108,11 @@ class RecedingHorizon(FrontierRule):
                 tree.add(place, nearest)
 
 
-def _gains(scene: Scene, tree: Tree, scanned: set[int]) -> np.ndarray:
-    """Return the gains (K,) of the branches that end in each place."""
-    voxels = np.array([_voxel(scene, place) for place in tree.places], np.int32)
+def _gains(scene: Scene, tree: Tree, voxels: np.ndarray, scanned: set[int]) -> np.ndarray:
+    """Return the gains (K,) of the branches that end in each place, which lie in (K,) voxels."""
     unknown = scene.cells.gains(voxels)
     unknown[[int(voxel) in scanned for voxel in voxels]] = 0.0
     gains = unknown * np.exp(-_DECAY * np.array(tree.lengths) / scene.cells.reach)
     for place in range(1, len(gains)):
         gains[place] += gains[tree.parents[place]]
     return np.asarray(gains)
-
-
-def _voxel(scene: Scene, place: np.ndarray) -> int:
-    """Return the voxel of a place (3,), in voxel edges."""
-    return int(np.ravel_multi_index(tuple(place.astype(int)), scene.view.scenario.grid.shape))

@@ -123,7 +123,7 @@ class Territory:
         return self._gazing(view, viewpoint)
 
     def _line_is_free(self, view: RobotKnowledge, place: np.ndarray) -> bool:
-        """Whether the straight line to a place (3,), map frame, is free by the belief."""
+        """Return whether the straight line to a place (3,), map frame, is free by the belief."""
         extent = (place - view.pose[:3]) / view.scenario.grid.voxel_size_m
         start, radius = view.scenario.grid.in_grid_units(view.pose), self._model_of(view).drive.body_radius
         return is_line_free(belief_of(view), start, extent, radius, self._scratch)

@@ -162,7 +162,7 @@ def check_against_reference(missions, known):
     candidates = strategy.cells_of(0)
     _, voxels = candidates.listed()
     state = np.where(known, 0, 3)
-    directions, reach = candidates._directions, candidates.reach
+    directions, reach = candidates._rays, candidates.reach
     shape, edge = known.shape, missions.grid.voxel_size_m
     where = {int(v): np.stack(np.unravel_index(int(v), shape)) for v in voxels}
     sees = {v: reference.seen_voxels(state, place + 0.5, directions, reach) for v, place in where.items()}

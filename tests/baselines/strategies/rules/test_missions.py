@@ -21,8 +21,7 @@ from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.settings import Grid
-from tests.baselines.strategies.explorers.scenes import varied
+from tests.planner.scenes import small_plan, varied
 from tests.reference import explorers as reference
 from tests.reference import planners
 
@@ -36,19 +35,6 @@ NAMES = (
     "tour",
 )
 SHARE = 0.995
-
-
-def small_plan(**settings):
-    """A part of a cluttered hall, for a point robot that decides at every scan under way."""
-    base = with_settings(scripted(find_scenario("cluttered")), {"grid": Grid((70, 60, 1), 0.1)})
-    changes = {
-        "robots": 1,
-        "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "redecide": "on_scan"},
-        "sensor": {"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_every_m": 0.2},
-        "ending": {"sigma_end": 1e-3, "time_limit_s": 2000.0},
-        "track_truth": True,
-    }
-    return with_settings(base, {**changes, **settings})
 
 
 def path_m(strategy, seed, scenario):

@@ -1,16 +1,19 @@
-"""Plans as a robot knows them, and what its rule reads of them: shared by the tests of explorers."""
+"""Plans as a robot knows them, and what its rule reads of them, for tests of rules and of the planner."""
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
 
+from baselines.experiments.mission import scripted
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_frontiers import BLOCK, VoxelFrontiers
+from entropy_explore_env.missions.view import TeammateView
 from entropy_explore_env.planner.frontier_rule import Scene
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
@@ -80,3 +83,34 @@ def corridor():
     plan[1:28, 1] = reference.FREE
     plan[0, 1] = plan[28:, 1] = reference.UNKNOWN
     return plan
+
+
+def pose_in(place):
+    """(5,) in the middle of a cell."""
+    return np.array([0.1 * (place[0] + 0.5), 0.1 * (place[1] + 0.5), 0.05, 0.0, 0.0])
+
+
+def mate(place, target=None):
+    """A teammate that was heard in a cell just now; under way to another, if that is given."""
+    announced_s = -1.0 if target is None else 5.0
+    viewpoint = pose_in(place if target is None else target)
+    return TeammateView(4.0, pose_in(place), announced_s, viewpoint, 0.0, 0.0)
+
+
+def with_mates(scene, mates):
+    scene.view.time_s = 5.0
+    scene.view.teammates = dict(enumerate(mates, start=1))
+    return scene
+
+
+def small_plan(**settings):
+    """A part of a cluttered hall, for a point robot that decides at every scan under way."""
+    base = with_settings(scripted(find_scenario("cluttered")), {"grid": Grid((70, 60, 1), 0.1)})
+    changes = {
+        "robots": 1,
+        "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "redecide": "on_scan"},
+        "sensor": {"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_every_m": 0.2},
+        "ending": {"sigma_end": 1e-3, "time_limit_s": 2000.0},
+        "track_truth": True,
+    }
+    return with_settings(base, {**changes, **settings})

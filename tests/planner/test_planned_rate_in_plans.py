@@ -15,9 +15,7 @@ from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import OFFICE, find_scenario
-from tests.baselines.strategies.explorers.scenes import cell, random_plan, scene_of
-from tests.baselines.strategies.explorers.test_coordination import mate, with_mates
-from tests.baselines.strategies.explorers.test_missions import small_plan
+from tests.planner.scenes import cell, mate, random_plan, scene_of, small_plan, with_mates
 from tests.reference import explorers as reference
 from tests.reference.scenes import drawn, seeds
 
