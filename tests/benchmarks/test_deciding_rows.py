@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from PIL import Image
 
-from baselines.suites.bundled_worlds import WORLDS
 from benchmarks.deciding import decision_row, episodes_row, floor, floor_row, plan_rows, room_row, scanner_row
 from benchmarks.rows import Effort
 from entropy_explore_env.scenarios import BOX
