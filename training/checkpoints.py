@@ -15,9 +15,11 @@ Checkpoints of the policy alone lack the last three. Nothing is ever unpickled.
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import shutil
+import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -31,17 +33,64 @@ from safetensors.torch import load as tensors_of
 from safetensors.torch import save as bytes_of
 
 from entropy_explore_env.errors import EntropyExploreError, SettingError, one_of
-from entropy_explore_env.planner.candidate_features import FEATURES_VERSION
+from entropy_explore_env.missions.observation.layout import ObservationLayout
+from entropy_explore_env.planner.candidate_features import COLUMNS, CONTEXT_COLUMNS, FEATURES_VERSION
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings_json import scenario_of, settings_of
 from training.candidate_network import ATTENTION_LAYERS, check_attention_layers
-from training.errors import CheckpointError
 from training.networks import NETWORKS
-from training.stored_arrays import stored_arrays, stored_bytes
+
+
+class CheckpointError(SettingError):
+    """A checkpoint cannot be used: missing, broken, foreign, or of a policy for something else."""
+
+
+class NotFiniteError(EntropyExploreError):
+    """Training met a number that is not finite."""
+
+    def __init__(self, tensor: str, value: object, steps: int) -> None:
+        """Name the tensor, show the number and the steps at which it came up."""
+        super().__init__(f"{tensor} = {value} after {steps:,} steps: allowed are finite numbers")
+        self.tensor, self.value, self.steps = tensor, value, steps
+
+
+class SilentRunnersError(EntropyExploreError):
+    """No runner has reported for so long that a run cannot go on."""
+
+    def __init__(self, runners: int, seconds: float, decisions: int) -> None:
+        """Say how many there are, how long they were waited for, and how far the run had come."""
+        super().__init__(
+            f"none of {runners} runners reported within {seconds:,.0f} s, after {decisions:,} decisions: "
+            "--resume goes on from the last checkpoint"
+        )
+        self.runners, self.seconds, self.decisions = runners, seconds, decisions
+
+
+def stored_bytes(arrays: Mapping[str, np.ndarray]) -> bytes:
+    """An archive of arrays, not compressed."""
+    file = io.BytesIO()
+    np.savez(file, **arrays)  # pyright: ignore[reportArgumentType] - names are those of arrays
+    return file.getvalue()
+
+
+def stored_arrays(content: bytes) -> dict[str, np.ndarray]:
+    """The arrays of an archive that `stored_bytes` made.
+
+    Raises:
+        ValueError: Its arrays are compressed. A broken archive raises whatever zipfile and NumPy raise.
+    """
+    with zipfile.ZipFile(io.BytesIO(content)) as members:
+        if any(each.file_size != each.compress_size for each in members.infolist()):
+            raise ValueError("its arrays are compressed: a small file could fill the memory")
+    with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+        return {name: arrays[name] for name in arrays.files}
+
 
 FORMAT = 1
 _MOST_WEIGHTS = 1 << 26
 _MOST_PRIVILEGED = 1024
+_CANDIDATE_FEATURES = [*COLUMNS, *(f"context: {name}" for name in CONTEXT_COLUMNS)]
+"""Names of what policies over candidates read: of each candidate, and of the robot's situation."""
 _KEPT = 2
 """How many of a run's latest checkpoints of a kind stay, in case the newest one turns out unreadable."""
 
@@ -116,6 +165,7 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
         files["training.safetensors"] = bytes_of(checkpoint.trainer.tensors)
         files["training.npz"] = stored_bytes(checkpoint.trainer.arrays)
         files["training.json"] = _json(checkpoint.trainer.counters)
+    over_candidates = checkpoint.settings.features == "candidates"
     files["policy.json"] = _json(
         {
             "format": FORMAT,
@@ -123,6 +173,8 @@ def save_checkpoint(folder: Path, checkpoint: Checkpoint) -> None:
             "hidden": list(checkpoint.settings.hidden),
             "privileged": checkpoint.settings.privileged,
             "features_version": checkpoint.settings.features_version,
+            "candidate_features": _CANDIDATE_FEATURES if over_candidates else None,
+            "observation": _observation_of(checkpoint.settings.scenario),
             "attention_layers": checkpoint.settings.attention_layers,
             "progress": checkpoint.progress,
             "sha256": {name: hashlib.sha256(content).hexdigest() for name, content in files.items()},
@@ -232,13 +284,10 @@ def _settings(folder: Path, head: Mapping[str, Any]) -> PolicySettings:
         raise CheckpointError(
             f"{folder}: hidden", hidden, f"layers with at most {_MOST_WEIGHTS} weights between"
         )
-    privileged, version = head.get("privileged", 0), head.get("features_version")
+    privileged = head.get("privileged", 0)
     if type(privileged) is not int or not 0 <= privileged <= _MOST_PRIVILEGED:
         raise CheckpointError(f"{folder}: privileged", privileged, f"from 0 to {_MOST_PRIVILEGED}")
-    current = FEATURES_VERSION if features == "candidates" else None
-    if version != current or isinstance(version, bool):
-        allowed = f"{current}: its features of candidates are not those of this library"
-        raise CheckpointError(f"{folder}: features_version", version, allowed)
+    check_features_version(folder, head)
     layers = head.get("attention_layers", ATTENTION_LAYERS)
     try:
         check_attention_layers(layers)
@@ -246,9 +295,57 @@ def _settings(folder: Path, head: Mapping[str, Any]) -> PolicySettings:
         raise CheckpointError(f"{folder}: attention_layers", layers, error.allowed) from None
     try:
         scenario = scenario_of(head.get("scenario", {}))
-        return PolicySettings(scenario, features, tuple(hidden), privileged, version, layers)
     except EntropyExploreError as error:
         raise CheckpointError(f"{folder}: scenario", str(error), "settings of this version") from None
+    _check_observation(folder, head.get("observation"), scenario)
+    version = head.get("features_version")
+    return PolicySettings(scenario, features, tuple(hidden), privileged, version, layers)
+
+
+def check_features_version(folder: Path, head: Mapping[str, Any]) -> None:
+    """Check that a policy over candidates was trained on the features that this library computes.
+
+    Args:
+        folder: Of the checkpoint.
+        head: What its policy.json holds.
+
+    Raises:
+        CheckpointError: Version or names of its features are others.
+    """
+    version = head.get("features_version")
+    current = FEATURES_VERSION if head.get("features") == "candidates" else None
+    if version != current or isinstance(version, bool):
+        allowed = f"{current}: its features of candidates are not those of this library"
+        raise CheckpointError(f"{folder}: features_version", version, allowed)
+    names = head.get("candidate_features")
+    if current is None or names is None or names == _CANDIDATE_FEATURES:
+        return
+    theirs = names if isinstance(names, list) else []
+    strange = [name for name in theirs if name not in _CANDIDATE_FEATURES]
+    missing = [name for name in _CANDIDATE_FEATURES if name not in theirs]
+    differing = next(iter((*strange, *missing)), "their order")
+    allowed = "the features of candidates of this library, in their order"
+    raise CheckpointError(f"{folder}: candidate_features", differing, allowed)
+
+
+def _check_observation(folder: Path, observation: object, scenario: Scenario) -> None:
+    """Check that an observation has the parts and shapes that a policy was trained on.
+
+    Raises:
+        CheckpointError: One of them is another one.
+    """
+    if observation is None:  # of a checkpoint from before they were noted
+        return
+    ours, theirs = _observation_of(scenario), observation if isinstance(observation, dict) else {}
+    for name in (*ours, *theirs):
+        if ours.get(name) != theirs.get(name):
+            allowed = f"{ours.get(name)}, as this library observes in its scenario"
+            raise CheckpointError(f"{folder}: observation {name}", theirs.get(name), allowed)
+
+
+def _observation_of(scenario: Scenario) -> dict[str, list[int]]:
+    """Return the name and shape of each part of an observation."""
+    return {name: list(part.shape) for name, part in ObservationLayout(scenario).parts.items()}
 
 
 def _content(file: Path, digests: Mapping[str, Any]) -> bytes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -20,11 +20,16 @@ from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.planner.candidate_features import FEATURES_VERSION
 from entropy_explore_env.planner.weights import SHIPPED
 from entropy_explore_env.scenario import Scenario
+from training.advantages import Normaliser
 from training.candidate_network import ATTENTION_LAYERS, CandidatePolicy
-from training.checkpoints import Checkpoint, PolicySettings, latest_checkpoint, load_checkpoint
-from training.errors import CheckpointError
+from training.checkpoints import (
+    Checkpoint,
+    CheckpointError,
+    PolicySettings,
+    latest_checkpoint,
+    load_checkpoint,
+)
 from training.networks import VectorFeatures, policy_class, policy_keywords
-from training.normalisation import Normaliser
 
 _SHARED = ("pi_features_extractor.", "vf_features_extractor.")
 """Further names of `features_extractor`, which actor and critic share."""
@@ -45,13 +50,18 @@ def make_policy(
         spaces.Box(-np.inf, np.inf, (size,), np.float32),
         action_space(settings.scenario),
         schedule,
-        **policy_keywords(
-            settings.features,
-            settings.scenario,
-            settings.hidden,
-            settings.privileged,
-            settings.attention_layers,
-        ),
+        **keywords_of(settings),
+    )
+
+
+def keywords_of(settings: PolicySettings) -> dict[str, Any]:
+    """Return the `policy_kwargs` of a Stable-Baselines3 policy with these settings."""
+    return policy_keywords(
+        settings.features,
+        settings.scenario,
+        settings.hidden,
+        settings.privileged,
+        settings.attention_layers,
     )
 
 
@@ -147,6 +157,29 @@ def choose_actions(
         if rng is not None:
             actions = torch.normal(actions, chosen.stddev, generator=rng)
         return actions.clamp(-1.0, 1.0).numpy()
+
+
+def panorama_form(kind: str, yaws: int, pitches: int) -> dict[str, dict[str, Any]]:
+    """Actions and observation of a policy that looks at a panorama, with a ray for each gaze."""
+    return {
+        "action": {"kind": kind, "moves": "axes", "yaws": yaws, "pitches": pitches},
+        "observation": {
+            "panorama_yaws": yaws,
+            "panorama_pitches": pitches,
+            "panorama_utility": "log2",
+            "flat": True,
+        },
+    }
+
+
+def candidate_form(candidates: int) -> dict[str, Any]:
+    """Actions and observation of a policy over candidates; nothing of it depends on the team or the world."""
+    nothing_else = dict.fromkeys(("panorama", "self_state", "team"), False)
+    seen = dict.fromkeys(("candidates", "overlaps", "action_mask", "flat"), True)
+    return {
+        "action": {"kind": "candidates", "candidates": candidates},
+        "observation": {**nothing_else, **seen, "while_busy": False},
+    }
 
 
 class Misfit(NamedTuple):

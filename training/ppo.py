@@ -22,49 +22,71 @@ import sys
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import torch
+from gymnasium import spaces
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
-from baselines.cli.arguments import make_folder, print_json, run_command
-from baselines.cli.task_options import base_task
-from entropy_explore_env.command import INTERRUPTED
+from baselines.cli.arguments import INLINE, WholeNumber, make_folder, parse, print_json, run_command
+from baselines.cli.task_options import (
+    TaskOptions,
+    absolute_files,
+    base_task,
+    is_whole_scenario,
+    parsed_for,
+    settled,
+    tasked,
+)
+from entropy_explore_env.command import INTERRUPTED, home_path
 from entropy_explore_env.envs.privileged_vec_env import PrivilegedVecEnv
 from entropy_explore_env.envs.rewards import StepFigures
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.validation import check_whole
 from entropy_explore_env.writing import write_atomically
 from training import extra  # noqa: F401 - before what is not there without it
-from training.advantages import DecisionBuffer
-from training.best_mission import draw_best_mission
-from training.candidate_network import actor_frozen
-from training.checkpoints import checkpoint_name, forget_later, save_checkpoint
-from training.decision_ppo import DecisionPPO
-from training.errors import NotFiniteError
-from training.interruption import Interruption
-from training.networks import policy_class, policy_keywords
-from training.normalisation import Normaliser
-from training.policy import normalise_observations, settings_of_policy, weights_of
-from training.ppo_options import OWN, Args, check, parsed, settled_arguments, training_task
-from training.progress import MissionFigures, Progress
-from training.resuming import (
+from training.advantages import DecisionBuffer, DiscountUnit, Normaliser
+from training.candidate_network import (
+    ATTENTION_LAYERS,
+    WIDTH,
+    actor_frozen,
+    check_attention_layers,
+    check_width,
+)
+from training.checkpoints import NotFiniteError, checkpoint_name, forget_later, save_checkpoint
+from training.networks import policy_class
+from training.policy import (
+    candidate_form,
+    keywords_of,
+    normalise_observations,
+    panorama_form,
+    settings_of_policy,
+)
+from training.progress import Interruption, MissionFigures, Progress, TrainingBar
+from training.runs import (
     TrainingState,
+    check_finite,
+    check_options,
+    check_share,
     check_unused,
     checkpoint_to_resume,
+    options_json,
     restore_state,
+    resume_command,
+    resumed_options,
+    save_options,
     save_policy,
     save_state,
     start_from,
 )
-from training.run_folder import options_json, resume_command, resumed_options, save_options
-from training.seeds import learning_seeds
-from training.terminal import TrainingBar
-from training.training_task import TrainingTask, validation_task
-from training.validation import Validator
+from training.validation import TrainingTask, Validator, draw_best_mission, learning_seeds, validation_task
 
 _MODULE = "training.ppo"
 _CHANGEABLE = frozenset(
@@ -74,6 +96,207 @@ _CHANGEABLE = frozenset(
 _STOPPED = "a checkpoint is written when this rollout and its update, or this validation, are done"
 _RETURNS_MEMORY = 2e5
 """Decisions, about, whose returns normalise: the latest ones, since returns grow as the policy learns."""
+OWN = {"ending": {"time_limit_s": 2000.0}}
+"""What training changes of named scenarios: longer missions would teach little and take all the time."""
+_UPDATES, _LEAST = 8, (8, 16)
+"""Of a short run by default: its updates, and the least missions and steps of a rollout."""
+
+
+@dataclass
+class Args:
+    """Train a policy with PPO."""
+
+    scenario: str = "room"
+    """Named scenario: room, room-furnished, office, … (docs/environments.md lists them)."""
+    robots: int = 3
+    """Robots in a team."""
+    missions: int = 64
+    """Missions simulated at a time; fewer by default where --total-steps is small."""
+    total_steps: WholeNumber = 2_500_000
+    """Steps to train for, counted per robot."""
+    seed: int = 0
+    """Seed of weights, missions and all other draws."""
+    out: Path | None = None
+    """Folder of a new run; default: runs/SCENARIO-ROBOTS."""
+    resume: Path | None = None
+    """Folder of a run to continue from its latest checkpoint, with the settings that it was started with."""
+    threads: int = 2
+    """Threads for missions and for updates; choosing actions takes one."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+    reward: Literal["individual", "team", "seconds"] = "individual"
+    """individual: bits that the robot's own scans take from its map; team: bits that the team's maps lose;
+    seconds: less the seconds that the mission takes, and nothing else."""
+    cost_per_s: float | None = None
+    """Cost of a second, as a share of all bits that the mission has to gain; default: the scenario's."""
+    task: Annotated[TaskOptions, INLINE] = dataclasses.field(default_factory=TaskOptions)
+    validation_world: tuple[str, ...] = ()
+    """World files of validation, read as those of --world; default: the same as those learned in."""
+
+    features: Literal["gazes", "vector", "maps"] = "gazes"
+    """vector: an MLP; gazes: also a small network for gazes, over the panorama; maps: also convolutions."""
+    overview: bool = False
+    """Observe the whole belief, pooled to a few cells; with vector features as plain numbers."""
+    patch: bool = False
+    """Observe the belief around the robot; needs `--features maps`."""
+    hidden: tuple[int, ...] = (128, 128)
+    """Units of the hidden layers of actor and critic."""
+    actions: Literal["discrete", "continuous", "candidates"] = "discrete"
+    """discrete: 7 moves × yaws × pitches; continuous: any viewpoint within reach; candidates: one of the
+    viewpoints that a planner proposes, with networks of their own that begin as the planner."""
+    candidates: int = 24
+    """Viewpoints that the planner proposes at most."""
+    width: int = WIDTH
+    """Units of each candidate in the networks of `--actions candidates`."""
+    attention_layers: int = ATTENTION_LAYERS
+    """Layers in which candidates look at each other; 0 = an MLP judges each alone."""
+    critic: Literal["observed", "privileged"] = "observed"
+    """privileged: in training the critic of `--actions candidates` also reads what no robot may know."""
+    yaws: int = 16
+    """Gazes, and rays of the panorama, around the horizon."""
+    pitches: int = 7
+    """Gazes, and rays of the panorama, from -45° to 45°."""
+
+    rollout_steps: int = 128
+    """Steps of each mission between two updates; fewer by default where --total-steps is small."""
+    epochs: int = 4
+    """Passes over a rollout's decisions in an update."""
+    batch: int = 1024
+    """Decisions in a minibatch."""
+    learning_rate: float = 1e-3
+    """Adam's learning rate at first; it falls linearly to a twentieth."""
+    discount: DiscountUnit = "seconds"
+    """What the discount is counted in: seconds or decisions."""
+    gamma: float = 0.9
+    """Discount factor per second, or per decision."""
+    gae_lambda: float = 0.95
+    """λ of generalised advantage estimation, per decision."""
+    clip: float = 0.2
+    """Clipping range of PPO's probability ratio."""
+    entropy: float = 0.003
+    """Weight of the entropy bonus."""
+    target_kl: float | None = None
+    """An update ends when the policy has moved about this far, in nats; default: after all of its epochs."""
+    critic_first: int = 0
+    """Updates at the beginning in which only the critic learns."""
+    start: str | None = None
+    """A run or a checkpoint whose weights to begin with; default: fresh ones."""
+
+    validate_every: WholeNumber = 250_000
+    """Steps between two validations."""
+    validation_missions: int = 32
+    """Missions in a validation."""
+    video: bool = True
+    """At the end, run a mission of the best policy and write it as a picture and an animation."""
+    checkpoint_every: WholeNumber = 500_000
+    """Steps between two checkpoints, the first after the first update: what a run that is killed loses at
+    most; one that Ctrl-C stops loses nothing."""
+
+    @property
+    def over_candidates(self) -> bool:
+        """Whether actions are numbers of candidates."""
+        return self.actions == "candidates"
+
+    @property
+    def networks(self) -> str:
+        """Name of the networks."""
+        return "candidates" if self.over_candidates else self.features
+
+    @property
+    def layers(self) -> tuple[int, ...]:
+        """Units of the networks, as PolicySettings have them."""
+        return (self.width,) if self.over_candidates else tuple(self.hidden)
+
+
+def check(args: Args) -> None:
+    """Raise a SettingError where an option is out of its range."""
+    check_options(args)
+    for name in ("threads", "rollout_steps", "validate_every", "validation_missions"):
+        check_whole(name, getattr(args, name), 1)
+    check_share("gamma", args.gamma)
+    if not 0.0 <= args.entropy < np.inf:
+        raise SettingError("entropy", args.entropy, "a number ≥ 0")
+    if args.patch and args.features != "maps":
+        raise SettingError("patch", args.patch, "used with --features maps, whose networks read it")
+    if args.target_kl is not None and not 0.0 < args.target_kl < np.inf:
+        raise SettingError("target_kl", args.target_kl, "a number above 0")
+    check_whole("critic_first", args.critic_first, 0)
+    _check_candidates(args)
+    own = base_task(args.scenario, args.task.settings, OWN).scenario.reward.cost_per_s  # as a run keeps it
+    if args.reward == "seconds" and args.cost_per_s not in (None, own):
+        raise SettingError("cost_per_s", args.cost_per_s, "left out with --reward seconds")
+
+
+_WITHOUT_CANDIDATES = ("features", "overview", "patch", "hidden", "yaws", "pitches")
+_WITH_CANDIDATES = ("critic", "critic_first", "width", "attention_layers", "candidates")
+
+
+def _check_candidates(args: Args) -> None:
+    """Raise a SettingError where options of actions and networks do not go together, or would be ignored."""
+    ignored = _WITHOUT_CANDIDATES if args.over_candidates else _WITH_CANDIDATES
+    word = "with" if args.over_candidates else "without"
+    defaults = Args()
+    for name in ignored:
+        if getattr(args, name) != getattr(defaults, name):
+            raise SettingError(name, getattr(args, name), f"left out {word} --actions candidates")
+    if args.over_candidates:
+        check_width(args.width)
+        check_attention_layers(args.attention_layers)
+
+
+def parsed(words: Sequence[str], description: str | None = None) -> Args:
+    """Return the arguments of a command line; what is not given is the scenario's own.
+
+    Raises:
+        UsageError: The words do not fit.
+        SettingError: There is no such scenario.
+    """
+    first = parse(Args, words, description=description)
+    task = base_task(first.scenario, first.task.settings, OWN)
+    robots = {"robots": task.scenario.robots} if is_whole_scenario(first.task.settings) else {}
+    named = dataclasses.replace(first, **robots)
+    args = parsed_for(task, first, words, **robots, **rollout_that_fits(named))
+    return settled_arguments(args)
+
+
+def rollout_that_fits(args: Args) -> dict[str, int]:
+    """Missions and steps of a rollout, by default: in a short run at most an eighth of it, if that can be.
+
+    Both are halved in turn, down to 8 missions and 16 steps.
+    """
+    missions, steps = Args.missions, Args.rollout_steps
+    while args.robots * missions * steps * _UPDATES > args.total_steps and (missions, steps) != _LEAST:
+        missions, steps = (missions, steps // 2) if steps > missions else (missions // 2, steps)
+    return {"missions": missions, "rollout_steps": steps}
+
+
+def settled_arguments(args: Args) -> Args:
+    """Return the same arguments wherever the run is continued."""
+    files = absolute_files(args.validation_world)
+    start = None if args.start is None else str(home_path(args.start).absolute())
+    return dataclasses.replace(args, task=settled(args.task), validation_world=files, start=start)
+
+
+def training_task(args: Args) -> TrainingTask:
+    """What the policy learns in.
+
+    Raises:
+        SettingError: An option is not allowed.
+        WorldError: A world file cannot be used.
+    """
+    named = base_task(args.scenario, args.task.settings, OWN).scenario
+    scenario, surroundings = tasked(named, args.task, args.robots)
+    reward: dict[str, Any] = {} if args.reward == "seconds" else {"kind": args.reward}
+    if args.cost_per_s is not None:
+        reward["cost_per_s"] = args.cost_per_s
+    if args.over_candidates:
+        form = candidate_form(args.candidates)
+    else:
+        form = panorama_form(args.actions, args.yaws, args.pitches)
+        form["observation"] |= {"overview": args.overview, "patch": args.patch, "while_busy": False}
+    scenario = with_settings(scenario, {"robots": args.robots, "reward": reward, **form})
+    return TrainingTask(scenario, surroundings)
 
 
 def main(words: Sequence[str]) -> int:
@@ -126,27 +349,6 @@ def main(words: Sequence[str]) -> int:
     return 0
 
 
-def finished(args: Args, state: TrainingState) -> bool:
-    """Whether all steps are done, and the last validation, too."""
-    steps = state.model.num_timesteps
-    return steps >= args.total_steps and state.progress.validated(steps)
-
-
-def told(changed: Mapping[str, object]) -> str:
-    """What is said of options that differ from those that a run was started with."""
-    return "".join(f"; {name} was {value}" for name, value in changed.items())
-
-
-def say_stopped(out: Path, steps: int, as_json: bool) -> int:
-    """Say where a run that was interrupted stands, and how to go on; its exit code."""
-    command = resume_command(_MODULE, out)
-    if as_json:
-        print_json({"interrupted": True, "steps": steps, "resume": command})
-    else:
-        print(f"stopped after {steps:,} steps, with a checkpoint in {out}; go on with\n\n    {command}\n")
-    return INTERRUPTED
-
-
 def set_up(args: Args, task: TrainingTask) -> TrainingState:
     """Missions to learn from, and PPO with fresh weights."""
     around = task.surroundings.settings()
@@ -181,13 +383,7 @@ def set_up(args: Args, task: TrainingTask) -> TrainingState:
                 "return_stats": Normaliser(memory=_RETURNS_MEMORY),
                 "rng": np.random.default_rng(args.seed),
             },
-            policy_kwargs=policy_keywords(
-                settings.features,
-                settings.scenario,
-                settings.hidden,
-                settings.privileged,
-                settings.attention_layers,
-            ),
+            policy_kwargs=keywords_of(settings),
             seed=args.seed,
             device="cpu",
         )
@@ -217,7 +413,7 @@ def train(args: Args, state: TrainingState, bar: TrainingBar, interruption: Inte
             last = steps >= args.total_steps
             # What Ctrl-C cut short is made up for here when the run goes on.
             if steps >= progress.next_validation or (last and not finished(args, state)):
-                if validate(args, state, Validating(validator, bar, interruption)):
+                if validate(args, state, validator, bar, interruption):
                     progress.next_validation = steps + args.validate_every
             stop = last or interruption.asked
             if steps and (steps >= progress.next_checkpoint or stop):
@@ -255,22 +451,116 @@ def rollout_and_update(args: Args, state: TrainingState, callback: BaseCallback)
     normalise_observations(model.policy, state.observation_stats)
 
 
-class Validating(NamedTuple):
-    """What a validation needs: its missions, where it is shown, and what stops it."""
+class DecisionPPO(PPO):
+    """Stable-Baselines3's PPO over a RobotVecEnv, whose policy is asked only where robots decide.
 
-    validator: Validator
-    bar: TrainingBar
-    interruption: Interruption
+    What a busy robot would choose is ignored and its value is never used: neither is computed, and no random
+    number is drawn for it. The rollout holds action 0, value 0 and log-probability 0 in its place.
+    """
+
+    def start(self, total_steps: int, callback: BaseCallback) -> BaseCallback:
+        """Prepare a loop of rollouts and updates up to so many steps, as `learn` does."""
+        _, callback = self._setup_learn(total_steps - self.num_timesteps, callback, reset_num_timesteps=False)
+        return callback
+
+    def collect_rollouts(
+        self,
+        env: Any,  # noqa: ANN401 - a RobotVecEnv; the base class has them wider
+        callback: BaseCallback,
+        rollout_buffer: Any,  # noqa: ANN401 - a DecisionBuffer
+        n_rollout_steps: int,
+    ) -> bool:
+        """Fill the buffer and compute its advantages; False if the callback stopped it.
+
+        Raises:
+            NotFiniteError: A reward is not finite.
+        """
+        threads = torch.get_num_threads()
+        torch.set_num_threads(1)  # of a few robots at a time: more would only take time from the missions
+        try:
+            return self._collect(env, callback, rollout_buffer, n_rollout_steps)
+        finally:
+            torch.set_num_threads(threads)
+
+    def _collect(
+        self, env: RobotVecEnv, callback: BaseCallback, rollout_buffer: DecisionBuffer, steps: int
+    ) -> bool:
+        """As `collect_rollouts`."""
+        self.policy.set_training_mode(False)
+        rollout_buffer.reset()
+        callback.on_rollout_start()
+        for _ in range(steps):
+            before: Any = self._last_obs
+            actions, values, log_probs = self.choose(before, env.deciding)
+            within = actions
+            if isinstance(self.action_space, spaces.Box):
+                within = np.clip(actions, self.action_space.low, self.action_space.high)
+            observations: Any
+            observations, rewards, dones, infos = env.step(within)
+            self.num_timesteps += env.num_envs
+            if not np.isfinite(env.rewards).all():
+                value = env.rewards[~np.isfinite(env.rewards)][0]
+                raise NotFiniteError("reward", value, self.num_timesteps)
+            callback.update_locals(locals())
+            if not callback.on_step():
+                return False
+            self._update_info_buffer(infos, dones)
+            final_values = self._final_values(dones, infos)
+            starts = self._last_episode_starts
+            rollout_buffer.add_step(final_values, before, actions, rewards, starts, values, log_probs)
+            self._last_obs, self._last_episode_starts = observations, dones
+        with torch.no_grad():
+            values = self.policy.predict_values(torch.as_tensor(observations))
+        rollout_buffer.compute_returns_and_advantage(last_values=values, dones=dones)
+        callback.update_locals(locals())
+        callback.on_rollout_end()
+        return True
+
+    def choose(
+        self, observations: np.ndarray, deciding: np.ndarray
+    ) -> tuple[np.ndarray, torch.Tensor, torch.Tensor]:
+        """Actions (N,) or (N, K), values (N,) and log-probabilities (N,); 0 where a robot does not decide."""
+        shape: Any = self.action_space.shape
+        rows = [np.zeros((len(deciding), *shape), self.action_space.dtype)]
+        rows += [np.zeros(len(deciding), np.float32) for _ in range(2)]
+        if deciding.any():
+            with torch.no_grad():
+                chosen = self.policy(torch.as_tensor(observations[deciding]))
+            for all_rows, part in zip(rows, chosen, strict=True):
+                all_rows[deciding] = part.numpy().reshape(-1, *all_rows.shape[1:])
+        actions, values, log_probs = rows
+        return actions, torch.as_tensor(values), torch.as_tensor(log_probs)
+
+    def _final_values(self, dones: np.ndarray, infos: list[dict[str, Any]]) -> np.ndarray:
+        """(N,) values of the last observations of missions that were cut off, else 0."""
+        values = np.zeros(len(dones))
+        cut_off = [row for row in np.flatnonzero(dones) if infos[row]["TimeLimit.truncated"]]
+        if cut_off:
+            last = np.stack([infos[row]["terminal_observation"] for row in cut_off])
+            with torch.no_grad():
+                values[cut_off] = self.policy.predict_values(torch.as_tensor(last))[:, 0].numpy()
+        return values
+
+    def update(self) -> None:
+        """Learn from the rollout, at the learning rate of this moment."""
+        self._update_current_progress_remaining(self.num_timesteps, self._total_timesteps)
+        self.train()
+
+    def _excluded_save_params(self) -> list[str]:
+        """What `save` leaves out: the missions, and the buffer that refers to them."""
+        return [*super()._excluded_save_params(), "rollout_buffer_class", "rollout_buffer_kwargs"]
 
 
-def validate(args: Args, state: TrainingState, needs: Validating) -> bool:
+def validate(
+    args: Args, state: TrainingState, validator: Validator, bar: TrainingBar, interruption: Interruption
+) -> bool:
     """Add a row to the curve, and keep the policy if it is the best so far; False if Ctrl-C cut it short."""
     model, progress, steps, out = state.model, state.progress, state.model.num_timesteps, args.out
     assert out is not None
-    needs.bar.say_validating(steps, args.validation_missions)
+    bar.say_validating(steps, args.validation_missions)
     with progress.timed("validating_s"):
         model.policy.set_training_mode(False)
-        validation = needs.validator.validate(model.policy, lambda: needs.interruption.asked)
+        validation = validator.validate(model.policy, lambda: interruption.asked)
     if validation is None:
         return False
     is_best = progress.add_validation(steps, validation)
@@ -278,21 +568,31 @@ def validate(args: Args, state: TrainingState, needs: Validating) -> bool:
     for name, value in dataclasses.asdict(validation).items():
         if value is not None:
             model.logger.record(f"validation/{name}", value)
-    needs.bar.show_validation(steps, validation)
+    bar.show_validation(steps, validation)
     if is_best:
         save_checkpoint(out / checkpoint_name("best", steps), save_policy(state))
     return True
 
 
-def check_finite(model: PPO) -> None:
-    """Raise a NotFiniteError if the latest loss or any weight is not finite."""
-    for name, value in model.logger.name_to_value.items():
-        if name.startswith("train/") and name.endswith("loss") and not np.isfinite(value):
-            raise NotFiniteError(name, value, model.num_timesteps)
-    for name, weights in weights_of(model.policy).items():
-        if not torch.isfinite(weights).all():
-            value = float(weights[~torch.isfinite(weights)][0])
-            raise NotFiniteError(name, value, model.num_timesteps)
+def finished(args: Args, state: TrainingState) -> bool:
+    """Whether all steps are done, and the last validation, too."""
+    steps = state.model.num_timesteps
+    return steps >= args.total_steps and state.progress.validated(steps)
+
+
+def told(changed: Mapping[str, object]) -> str:
+    """What is said of options that differ from those that a run was started with."""
+    return "".join(f"; {name} was {value}" for name, value in changed.items())
+
+
+def say_stopped(out: Path, steps: int, as_json: bool) -> int:
+    """Say where a run that was interrupted stands, and how to go on; its exit code."""
+    command = resume_command(_MODULE, out)
+    if as_json:
+        print_json({"interrupted": True, "steps": steps, "resume": command})
+    else:
+        print(f"stopped after {steps:,} steps, with a checkpoint in {out}; go on with\n\n    {command}\n")
+    return INTERRUPTED
 
 
 if __name__ == "__main__":

@@ -1,20 +1,65 @@
-"""How far a training run is: its seconds, validations and best policy, and what TensorBoard shows of it."""
+"""What a person sees and does of a run: progress, curve, TensorBoard, the terminal, and Ctrl-C."""
 
 from __future__ import annotations
 
 import dataclasses
+import signal
+import sys
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from types import FrameType, TracebackType
 from typing import Any, Literal
 
 import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
 from stable_baselines3.common.callbacks import BaseCallback
 
 from baselines.experiments.tables import csv_table
 from training.advantages import DecisionBuffer
 from training.validation import Validation
+
+
+class Interruption:
+    """Notes a first Ctrl-C (SIGINT); used as a context, and only in the main thread it catches any.
+
+    Attributes:
+        asked: Whether there was one.
+    """
+
+    def __init__(self, promise: str) -> None:
+        """Take what is said at the first Ctrl-C: what will be done before the end."""
+        self.asked = False
+        self._promise = promise
+
+    def __enter__(self) -> Interruption:
+        self._catches = threading.current_thread() is threading.main_thread()
+        if self._catches:
+            self._before = signal.signal(signal.SIGINT, self._note)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._catches:
+            signal.signal(signal.SIGINT, self._before)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        """Take the signal.
+
+        Raises:
+            KeyboardInterrupt: It is not the first one.
+        """
+        del number, frame
+        if self.asked:
+            raise KeyboardInterrupt
+        self.asked = True
+        print(f"interrupted: {self._promise}; Ctrl-C again ends at once", file=sys.stderr, flush=True)
+
 
 _FIGURES = ("t_mission_s", "finished", "bits_gained_per_bit_sent", "overlap", "scans")
 """Figures of missions that TensorBoard shows."""
@@ -92,3 +137,74 @@ class MissionFigures(BaseCallback):
             if values:
                 self.logger.record(f"missions/{name}", float(np.mean(np.array(values, float))))
         self._figures.clear()
+
+
+LINE_EVERY_S = 20.0
+"""Where there is no terminal, a line says this often how far the run is."""
+
+
+class TrainingBar:
+    """Progress on standard error: a bar where that is a terminal, else lines at times."""
+
+    def __init__(self, total_steps: int, hidden: bool) -> None:
+        """Make a bar, which is shown while this is used as a context."""
+        self._console = Console(file=sys.stderr, highlight=False, quiet=hidden)
+        self._bar = Bar(
+            TextColumn("training"),
+            BarColumn(),
+            TextColumn("{task.completed:,.0f} of {task.total:,.0f} steps  {task.fields[latest]}"),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            console=self._console,
+            transient=True,
+            disable=hidden or not self._console.is_terminal,
+        )
+        self._lines = not hidden and not self._console.is_terminal
+        self._total, self._began_s, self._next_s = total_steps, 0.0, 0.0
+        self._first_steps: int | None = None
+        self._task = self._bar.add_task("", total=total_steps, latest="")
+
+    def __enter__(self) -> TrainingBar:
+        self._bar.start()
+        self._began_s = self._next_s = time.perf_counter()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._bar.stop()
+
+    def say(self, line: str) -> None:
+        """Print a line, above the bar."""
+        self._console.print(line, soft_wrap=True)
+
+    def show_steps(self, steps: int) -> None:
+        """Move the bar to this many steps, or say so in a line, if one is due."""
+        self._bar.update(self._task, completed=steps)
+        now_s = time.perf_counter()
+        if self._first_steps is None:
+            self._first_steps = steps
+        elif self._lines and now_s >= self._next_s and steps > self._first_steps:
+            self._next_s = now_s + LINE_EVERY_S
+            speed = (steps - self._first_steps) / max(now_s - self._began_s, 1e-9)
+            left_min = max(self._total - steps, 0) / max(speed, 1e-9) / 60.0
+            self.say(
+                f"{steps:>12,} steps of {self._total:,}, {speed:,.0f} a second, {left_min:,.0f} min left, "
+                "and validations"
+            )
+
+    def say_validating(self, steps: int, missions: int) -> None:
+        """Say that a validation begins, where lines stand in place of the bar."""
+        if self._lines:
+            self.say(f"{steps:>12,} steps: validating in {missions:,} missions")
+
+    def show_validation(self, steps: int, validation: Validation) -> None:
+        """Print what the validation after so many steps found."""
+        self._bar.update(self._task, latest=f"missions take {validation.median_s:,.0f} s")
+        ratio = validation.planner_ratio
+        beside = "" if ratio is None else f", {ratio:.3f} times as long as the planner's"
+        self._console.print(
+            f"{steps:>12,} steps: missions take {validation.median_s:,.1f} s (median){beside}, "
+            f"{validation.finished:.0%} finished",
+            soft_wrap=True,
+        )

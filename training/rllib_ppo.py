@@ -38,23 +38,31 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.validation import check_whole
 from training import extra  # noqa: F401 - before what is not there without it
 from training.advantages import DiscountUnit
-from training.errors import NotFiniteError, SilentRunnersError
-from training.interruption import Interruption
-from training.options import check_new, check_options, check_share
-from training.ppo_options import OWN
-from training.ray_cluster import check_address, start_ray
-from training.rllib_settings import (
+from training.checkpoints import NotFiniteError, SilentRunnersError
+from training.ppo import OWN
+from training.progress import Interruption
+from training.rllib_run import (
     FIGURES,
     POLICY,
     SAMPLE_TIMEOUT_S,
+    check_address,
     configure,
     environment_settings,
     policy_of,
+    start_ray,
 )
-from training.run_folder import FILE, resume_command, resumed_options, save_options
+from training.runs import (
+    FILE,
+    check_new,
+    check_options,
+    check_share,
+    resume_command,
+    resumed_options,
+    save_options,
+)
 
 if TYPE_CHECKING:
-    from training.rllib_validation import RunValidation
+    from training.rllib_run import RunValidation
     from training.validation import Validation
 
 _MODULE = "training.rllib_ppo"
@@ -212,7 +220,7 @@ def train(args: Args, env_settings: dict[str, Any], interruption: Interruption) 
     import torch
 
     from entropy_explore_env.envs.rllib_env import EntropyExploreMultiAgentEnv
-    from training.rllib_validation import RunValidation
+    from training.rllib_run import RunValidation
     from training.validation import Validator
 
     assert args.out is not None

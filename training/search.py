@@ -52,9 +52,9 @@ from entropy_explore_env.settings_json import settings_of
 from entropy_explore_env.validation import check_whole, is_number
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.writing import write_atomically
-from training.evaluate import task_of
-from training.interruption import Interruption
-from training.seeds import pair_seeds
+from training.evaluate import task_of  # which says what is missing without the extra
+from training.progress import Interruption
+from training.validation import pair_seeds
 
 SEARCHED = (
     "bits_log", "seconds", "kept", "spot", "far", "soonness", "again", "unique", "common", "slivers",

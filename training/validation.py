@@ -1,20 +1,90 @@
-"""How a policy does in missions that it does not learn from."""
+"""How a policy does in missions that it does not learn from: their seeds, their worlds, and their figures.
+
+Learning, validation and tables never share a seed:
+
+| for | seeds |
+| --- | --- |
+| tables and tests | 0, 1, 2, … |
+| validation | 2³² + 0, 1, 2, … |
+| learning, and pairs of missions | ≥ 2⁶³, drawn for each run |
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
 from stable_baselines3.common.policies import ActorCriticPolicy
 
-from baselines.experiments.mission import Surroundings
+from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted
+from baselines.cli.task_options import TaskOptions, worlds_of
+from baselines.experiments.mission import Surroundings, run_mission, scripted
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.scenario import Scenario, with_settings
 from training.candidate_network import CandidatePolicy
-from training.policy import choose_actions
-from training.seeds import validation_seeds
+from training.policy import LearnedPolicy, choose_actions, misfit
+
+_VALIDATION, _LEARNING = 2**32, 2**63
+_PAIRS_KEY = 2
+
+
+def validation_seeds(missions: int) -> list[int]:
+    """Return the seeds of validation; every run has the same, so that runs compare."""
+    return [_VALIDATION + mission for mission in range(missions)]
+
+
+def pair_seeds(seed: int, part: int, pairs: int) -> list[int]:
+    """Seeds of the pairs of missions of one part of a search; those of learning, and never one twice."""
+    return _drawn(seed, (_PAIRS_KEY, part), pairs)
+
+
+def learning_seeds(seed: int, missions: int) -> list[int]:
+    """Seeds of the missions that a run with this seed begins with."""
+    return _drawn(seed, (0,), missions)
+
+
+def _drawn(seed: int, key: tuple[int, ...], missions: int) -> list[int]:
+    """Seeds of learning that follow from a run's seed and a key; others for every key."""
+    sequence = np.random.SeedSequence(entropy=seed, spawn_key=key)
+    return [_LEARNING + int(drawn) for drawn in sequence.generate_state(missions, np.uint64)]
+
+
+class TrainingTask(NamedTuple):
+    """Missions to learn from, or to validate a policy with."""
+
+    scenario: Scenario
+    surroundings: Surroundings = Surroundings()
+
+
+def validation_task(
+    options: TaskOptions, files: Sequence[str], learned: Scenario, training: TrainingTask
+) -> TrainingTask:
+    """What a policy is validated in: world files of its own, or the worlds that it learns in.
+
+    Args:
+        options: Of the run, which say how the files are read.
+        files: World files of validation; none = the worlds of training.
+        learned: The scenario of training, with the grid of its worlds.
+        training: What the policy learns in.
+
+    Raises:
+        SettingError: The policy observes all of the map, and its size differs.
+        WorldError: A world file cannot be used.
+    """
+    if not files:
+        return TrainingTask(learned, training.surroundings)
+    around = Surroundings(json.dumps(worlds_of(options, files)))
+    there = EntropyExploreEnv(learned, **around.settings()).scenario
+    if (differs := misfit(there, learned)) is not None:
+        raise SettingError("validation_world", differs.given, f"worlds with {differs.what} {differs.trained}")
+    return TrainingTask(learned, around)
 
 
 @dataclass(frozen=True)
@@ -117,3 +187,24 @@ class Validator:
     def close(self) -> None:
         """End the threads."""
         self._env.close()
+
+
+def draw_best_mission(run: Path, scenario: Scenario, surroundings: Surroundings) -> list[Path]:
+    """Run a validation mission of the best policy and draw it.
+
+    Args:
+        run: Folder of the run; the files go into `best-mission` in it.
+        scenario: The scenario of training.
+        surroundings: World files and starts of the mission.
+
+    Returns:
+        The files.
+    """
+    wanted = Wanted(Outputs(json=True), run / "best-mission", recorded=False)
+    wanted.prepare()
+    changes = {"split": "validation", "track_truth": True, "action": {"kind": "continuous"}}
+    env = EntropyExploreEnv(with_settings(scripted(scenario), changes), **surroundings.settings())
+    with MissionLog(wanted) as log:
+        run_mission(env, LearnedPolicy(run), validation_seeds(1)[0], log.note, log.command)
+        _, files = log.finish(str(run))
+    return files

@@ -164,8 +164,8 @@ def checkpoint_files(folder: Path) -> Saved:
     """A checkpoint of a small policy, with its trainer's state."""
     import torch
 
+    from training.advantages import Normaliser
     from training.checkpoints import Checkpoint, PolicySettings, TrainerState, save_checkpoint
-    from training.normalisation import Normaliser
     from training.policy import make_policy, weights_of
 
     torch.set_num_threads(1)  # of small matrices: more threads wait for each other

@@ -26,8 +26,10 @@ from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import find_scenario
 from training import evaluate
+from training.advantages import Normaliser
 from training.checkpoints import (
     Checkpoint,
+    CheckpointError,
     PolicySettings,
     TrainerState,
     checkpoint_name,
@@ -35,10 +37,8 @@ from training.checkpoints import (
     load_checkpoint,
     save_checkpoint,
 )
-from training.errors import CheckpointError
-from training.normalisation import Normaliser
 from training.policy import PRETRAINED, LearnedPolicy, load_policy, make_policy, weights_of
-from training.seeds import learning_seeds, validation_seeds
+from training.validation import learning_seeds, validation_seeds
 
 FORM = {"robots": 2, "action": {"kind": "discrete", "moves": "axes"}, "observation": {"flat": True}}
 SCENARIO = with_settings(find_scenario("box-7x11x5"), FORM)

@@ -25,9 +25,8 @@ from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from tests.systems import needs_posix
 from training import ppo
 from training.advantages import DecisionBuffer
-from training.checkpoints import checkpoint_name, latest_checkpoint, load_checkpoint
-from training.errors import NotFiniteError
-from training.interruption import Interruption
+from training.checkpoints import NotFiniteError, checkpoint_name, latest_checkpoint, load_checkpoint
+from training.progress import Interruption
 from training.validation import Validator
 
 ROOT = Path(__file__).parents[2]

@@ -6,6 +6,7 @@ import contextlib
 import csv
 import io
 import json
+import shutil
 from contextlib import closing
 from pathlib import Path
 
@@ -17,14 +18,14 @@ from baselines.experiments.mission import Surroundings
 from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.envs.privileged_vec_env import PrivilegedVecEnv
 from entropy_explore_env.missions.privileged import PRIVILEGED
-from entropy_explore_env.planner.candidate_features import FEATURES_VERSION
+from entropy_explore_env.planner.candidate_features import COLUMNS, FEATURES_VERSION
 from tests.training.test_ppo import checkpoint_bits
 from training import ppo
 from training.advantages import DecisionBuffer
 from training.candidate_network import CandidatePolicy
-from training.checkpoints import latest_checkpoint, load_checkpoint
+from training.checkpoints import CheckpointError, latest_checkpoint, load_checkpoint
 from training.policy import make_policy_strategy
-from training.ppo_options import parsed, training_task
+from training.ppo import parsed, training_task
 from training.validation import Validator
 
 TINY = (
@@ -125,6 +126,43 @@ def test_weights_of_other_networks_are_refused(trained, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
+    ("changes", "named"),
+    [
+        ({"features_version": FEATURES_VERSION + 1}, "features_version = 2: allowed is 1: its features"),
+        ({"features_version": None}, "features_version = None"),
+        ({"candidate_features": ["score", "beauty"]}, "candidate_features = 'beauty'"),
+        ({"candidate_features": list(COLUMNS)}, "candidate_features = 'context: entropy'"),
+        ({"candidate_features": 3}, "candidate_features = 'score'"),
+        (
+            {"observation": {"candidates": [5, 99]}},
+            r"observation candidates = \[5, 99\]: allowed is \[5, 34\]",
+        ),
+        ({"observation": "all"}, "observation candidates = None"),
+        ({"scenario": {"robots": 0}}, "scenario"),
+    ],
+)
+def test_a_policy_of_other_features_is_refused_by_name(changes, named, trained, tmp_path):
+    folder = tmp_path / "policy"
+    shutil.copytree(latest_checkpoint(trained, "best"), folder)
+    head = json.loads((folder / "policy.json").read_text())
+    (folder / "policy.json").write_text(json.dumps(head | changes))
+    with pytest.raises(CheckpointError, match=named):
+        load_checkpoint(folder)
+    with pytest.raises(CheckpointError, match=named):
+        make_policy_strategy(str(folder))
+
+
+def test_names_of_features_in_another_order_are_refused(trained, tmp_path):
+    folder = tmp_path / "policy"
+    shutil.copytree(latest_checkpoint(trained, "best"), folder)
+    head = json.loads((folder / "policy.json").read_text())
+    head["candidate_features"].reverse()
+    (folder / "policy.json").write_text(json.dumps(head))
+    with pytest.raises(CheckpointError, match="candidate_features = 'their order'"):
+        load_checkpoint(folder)
+
+
+@pytest.mark.parametrize(
     "words",
     [
         ["--width", "6"],
@@ -170,6 +208,6 @@ def test_options_that_are_read_are_not_refused():
 
 def test_checkpoints_of_earlier_versions_have_no_candidates(trained):
     head = json.loads((latest_checkpoint(trained, "best") / "policy.json").read_text())
-    assert {"privileged", "features_version"} <= head.keys()
+    assert {"privileged", "features_version", "candidate_features", "observation"} <= head.keys()
     pretrained = load_checkpoint(latest_checkpoint(Path("training/pretrained/room"), "best", "step"))
     assert pretrained.settings.privileged == 0 and pretrained.settings.features_version is None

@@ -12,9 +12,9 @@ import pytest
 
 from baselines.cli.arguments import run_command
 from entropy_explore_env.command import INTERRUPTED
-from training import rllib_ppo, run_folder
-from training.errors import NotFiniteError, SilentRunnersError
-from training.interruption import Interruption
+from training import rllib_ppo, runs
+from training.checkpoints import NotFiniteError, SilentRunnersError
+from training.progress import Interruption
 from training.rllib_ppo import Args, last_checkpoint, main
 from training.validation import Validation
 
@@ -63,7 +63,7 @@ def test_a_folder_that_cannot_be_written(tmp_path, capsys, monkeypatch):
     def refuse(path: Path, content: str) -> None:
         raise PermissionError(errno.EACCES, "Permission denied", str(path))
 
-    monkeypatch.setattr(run_folder, "write_atomically", refuse)
+    monkeypatch.setattr(runs, "write_atomically", refuse)
     monkeypatch.setattr(rllib_ppo, "start_ray", lambda address, runners: Quiet())
     assert run_command(main, ["--out", str(tmp_path)]) == 2
     said = capsys.readouterr().err
@@ -76,7 +76,7 @@ def test_without_ray_the_extra_is_named(tmp_path, capsys, monkeypatch):
     said = capsys.readouterr().err
     assert said.startswith("error: ray[rllib] is not installed: pip install torch --index-url ")
     assert said.endswith("then pip install 'entropy_explore_env[rllib]'\n") and said.count("\n") == 1
-    assert not (tmp_path / run_folder.FILE).exists()  # nothing to continue
+    assert not (tmp_path / runs.FILE).exists()  # nothing to continue
 
 
 class Scripted:

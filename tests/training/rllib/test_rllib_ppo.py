@@ -24,8 +24,7 @@ from baselines.strategies import make_strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from training.checkpoints import latest_checkpoint, load_checkpoint
 from training.rllib_ppo import Args, main, parsed
-from training.rllib_settings import configure, environment_settings
-from training.rllib_validation import read_rows
+from training.rllib_run import configure, environment_settings, read_rows
 
 pytestmark = [  # RLlib's own
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
