@@ -175,13 +175,8 @@ class CandidateActor(nn.Module):
         """Logits (N, K) of observations (N, at least `parts.size`)."""
         seen = seen_by_network(self.parts, observations)
         logits = self._planner(seen) + seen.candidates @ self.weights
-        if torch.is_grad_enabled() or self._has_residual():
-            logits = logits + self.residual(self._tokens(seen))[:, :, 0]
+        logits = logits + self.residual(self._tokens(seen))[:, :, 0]
         return torch.where(seen.exists, logits, _NEVER)
-
-    def _has_residual(self) -> bool:
-        """Whether it is anything but 0; with weights alone, as a search finds them, no layer has to run."""
-        return bool(self.residual.weight.any()) or bool(self.residual.bias.any())
 
     def _planner(self, seen: Seen) -> torch.Tensor:
         """(N, K) what the planner says of the candidates."""

@@ -38,16 +38,8 @@ def plans(tmp_path):
 def test_a_policy_learns_in_plans_and_is_tested_in_others(plans, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run = tmp_path / "run"
-    words = [
-        *TINY,
-        "--world",
-        "a/plan.png",
-        "b/plan.png",
-        "--validation-world",
-        "held.png",
-        "--robot.reach-m",
-        "2",
-    ]
+    files = "--world a/plan.png b/plan.png --validation-world held.png"
+    words = [*TINY, *files.split(), "--robot.reach-m", "2"]
     assert run_command(ppo.main, [*words, "--out", "run"]) == 0
     capsys.readouterr()
     learned = load_checkpoint(latest_checkpoint(run, "step")).settings.scenario

@@ -348,12 +348,6 @@ def test_a_disk_that_is_full_leaves_the_last_good_checkpoint(tmp_path, capsys, m
     assert resume(out) == 0
 
 
-def test_the_error_names_tensor_and_step():
-    assert str(NotFiniteError("train/loss", float("nan"), 12000)) == (
-        "train/loss = nan after 12,000 steps: allowed are finite numbers"
-    )
-
-
 def test_a_best_policy_without_a_checkpoint_counts_as_a_run_and_a_resumed_run_removes_it(tmp_path, capsys):
     """A run killed between its first validation and its first checkpoint leaves only a best policy."""
     out = tmp_path / "run"
