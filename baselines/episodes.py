@@ -9,28 +9,28 @@ from __future__ import annotations
 
 import dataclasses
 import importlib.util
-import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from baselines.cli.arguments import INLINE, Positional, make_folder, parse, print_json, run_command
 from baselines.cli.task_options import TaskOptions, base_task, parsed_for, tasked
-from baselines.cli.worker_options import WorkerOptions
-from baselines.experiments.runner import Conditions, run_all
+from baselines.cli.worker_options import TrialOptions
+from baselines.experiments.rows import read_table
+from baselines.experiments.trials import run_trials
 from baselines.strategies import make_strategy, resolved
 from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.validation import check_whole
 
-RECORDS = "_records"
-"""Folder in --out that says which files are whole; readers of Parquet pass by what begins with _."""
+ROWS = "_rows.jsonl"
+"""Table in --out that says which files are whole; readers of Parquet pass by what begins with _."""
 
 
 @dataclass
-class Args(WorkerOptions):
+class Args(TrialOptions):
     """Write a strategy's missions as Parquet."""
 
     scenario: Positional[str] = "room"
@@ -63,7 +63,7 @@ def main(words: Sequence[str]) -> int:
         check_whole(name, getattr(args, name), least)
     if importlib.util.find_spec("pyarrow") is None:
         raise MissingExtraError("pyarrow", "episodes")
-    workers, strategy = args.workers, resolved(args.strategy)
+    how, strategy = args.how("episodes", args.json), resolved(args.strategy)
     make_strategy(strategy)
     scenario, surroundings = tasked(task.scenario, args.task, args.robots)
     make_folder("out", args.out)
@@ -76,32 +76,18 @@ def main(words: Sequence[str]) -> int:
         for done in range(0, args.missions, args.missions_per_file)
         for missions in [min(args.missions_per_file, args.missions - done)]
     ]
-    forget_missing(shards, args.out / RECORDS)
-    records = run_all(shards, Conditions(args.out / RECORDS, workers, "episodes", args.json))
+    table = args.out / ROWS
+    kept = {row.key: row.record for row in read_table(table)}
+    lost = [shard for shard in shards if shard.key in kept and not shard.is_whole(kept[shard.key])]
+    run_trials(lost, table, dataclasses.replace(how, rerun=True, since=None))
+    records = [row.record for row in run_trials(shards, table, how) if row is not None]
     for shard, record in zip(shards, records, strict=True):
-        if not is_whole(shard, record):
+        if not shard.is_whole(record):
             allowed = f"a folder that all machines share: {shard.path.name} is not in it"
             raise SettingError("out", str(args.out), allowed)
     counted = ("missions", "decisions", "rows", "bytes")
     report({name: sum(record[name] for record in records) for name in counted}, args)
     return 0
-
-
-def forget_missing(shards: Sequence[Any], records: Path) -> None:
-    """Remove the records of files that are gone or of another size: they are written again."""
-    for shard in shards:
-        path = records / f"{shard.file}.json"
-        try:
-            record = json.loads(path.read_text())["record"]
-        except (OSError, ValueError, LookupError, TypeError):
-            continue
-        if not is_whole(shard, record):
-            path.unlink()
-
-
-def is_whole(shard: Any, record: dict[str, Any]) -> bool:  # noqa: ANN401 - a Shard, which needs pyarrow
-    """Whether a shard's file is there, as long as its record says."""
-    return shard.path.is_file() and shard.path.stat().st_size == record.get("bytes")
 
 
 def report(total: dict[str, int], args: Args) -> None:

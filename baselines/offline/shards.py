@@ -3,69 +3,82 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from baselines.experiments.mission import Surroundings
-from baselines.experiments.outcome import Outcome
-from baselines.experiments.provenance import code_digest, modules_of
+from baselines.experiments.rows import Record, trial_key
+from baselines.experiments.trials import Cell, CellTrial, described
 from baselines.offline.recorded_env import Row, record_mission, recorded_env
 from baselines.offline.schema import schema_of
 from entropy_explore_env.scenario import Scenario
 
 GROUP_ROWS = 4096
 """Rows of a row group."""
-_READERS = "entropy_explore_env.worlds.files"
 
 
 @dataclass(frozen=True)
 class Shard:
-    """The missions of one file, as the runner takes them.
+    """The missions of one file, as a trial of an experiment.
 
     Attributes:
         scenario: Of `observed_scenario`.
         strategy: Name of the strategy.
         surroundings: Worlds, starts and length of a step.
-        first, missions: The seeds first, first + 1, …
+        seed, missions: The missions have the seeds seed, seed + 1, …
         out: Folder of the files.
     """
 
     scenario: Scenario
     strategy: str
     surroundings: Surroundings
-    first: int
+    seed: int
     missions: int
     out: str
-
-    @property
-    def file(self) -> str:
-        """Its record's name in the folder of records; its own in `out`, with the suffix .parquet."""
-        return f"episodes-{self.first:09}"
+    cell = "episodes"
 
     @property
     def path(self) -> Path:
         """Where it is written."""
-        return Path(self.out) / f"{self.file}.parquet"
+        return Path(self.out) / f"episodes-{self.seed:09}.parquet"
 
     @property
-    def settings_digest(self) -> str:
-        """Of all that decides the file's bytes but the code."""
-        described = repr((self.scenario, self.strategy, self.surroundings, self.missions, pa.__version__))
-        for file in self.surroundings.files():
-            described += hashlib.sha256(file.read_bytes()).hexdigest()
-        return hashlib.sha256(described.encode()).hexdigest()
+    def world(self) -> str:
+        """The scenario's world, or the names of the world files."""
+        return self._mission.world
 
-    def code_digest(self) -> str:
-        """Of the code that this process would run its missions with."""
-        readers = modules_of(_READERS) if self.surroundings.files() else ()
-        return code_digest(__name__, *readers, strategy=self.strategy)
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All that decides the file's bytes but the code."""
+        seen = described(self.scenario.observation)
+        return {
+            **self._mission.settings,
+            "observation": seen,
+            "missions": self.missions,
+            "pyarrow": pa.__version__,
+        }
 
-    def run(self) -> Outcome:
+    @property
+    def key(self) -> str:
+        """What tells its row apart in a table."""
+        return trial_key(self.cell, self.seed, self.settings)
+
+    @property
+    def _mission(self) -> CellTrial:
+        """The first mission without observations."""
+        cell = Cell(self.cell, self.scenario, self.strategy, self.missions, surroundings=self.surroundings)
+        return CellTrial(cell, self.seed)
+
+    def is_whole(self, record: Record) -> bool:
+        """Return whether the file is there, as long as its record says."""
+        return self.path.is_file() and self.path.stat().st_size == record.get("bytes")
+
+    def run(self) -> Record:
         """Run the missions, and write the file whole or not at all."""
         env = recorded_env(self.scenario, self.surroundings)
         self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -73,12 +86,12 @@ class Shard:
         counts = {"missions": self.missions, "decisions": 0}
         try:
             with RowGroups(unfinished, schema_of(self.scenario, self.strategy)) as groups:
-                for seed in range(self.first, self.first + self.missions):
+                for seed in range(self.seed, self.seed + self.missions):
                     counts["decisions"] += record_mission(env, self.strategy, seed, groups.add)
             unfinished.replace(self.path)
         finally:
             unfinished.unlink(missing_ok=True)
-        return Outcome({**counts, "rows": groups.rows, "bytes": self.path.stat().st_size})
+        return {**counts, "rows": groups.rows, "bytes": self.path.stat().st_size}
 
 
 class RowGroups:

@@ -122,10 +122,9 @@ def tasks_table(results: Results) -> str:
     head = ["strategy", "finished", *(measure.words for measure in measures), f"over `{results.reference}`"]
     head += [words for words, _ in _TASK_COLUMNS.values()]
     first, parts = measures[0].name, []
+    all_rows = sorted(task_rows(results), key=lambda row: row[first])
     for task in results.tasks:
-        rows = sorted(
-            (row for row in task_rows(results) if row["task"] == task.name), key=lambda row: row[first]
-        )
+        rows = [row for row in all_rows if row["task"] == task.name]
         cells = [_task_cells(row, measures) for row in rows]
         parts.append(f"**{task.name}**: {about(task)}\n\n{markdown_table(head, cells)}")
     return "\n".join(parts)

@@ -34,7 +34,8 @@ def show_results(results: Results, refused: Sequence[str], tables: bool) -> None
     from rich.table import Table
 
     measure, reference = results.suite.measures[0], results.reference
-    names = ", ".join(task.name for task in results.tasks)
+    own = results.suite.name == "own"
+    names = ", ".join(task.name for task in results.tasks) if own else results.suite.title
     table = Table(
         title=f"{names}\nratios: over {reference}'s",
         title_justify="left",
