@@ -35,20 +35,25 @@ def absurd_binary(data: bytes, rng: np.random.Generator) -> bytes:
     return data[:start] + word + data[start + 4 :]
 
 
-def _undated(name: str) -> zipfile.ZipInfo:
-    """A member of an archive that is the same at any time."""
-    info = zipfile.ZipInfo(name)
-    info.compress_type = zipfile.ZIP_DEFLATED
-    return info
+def _archive(members: dict[str, bytes]) -> bytes:
+    """A compressed archive, the same at any time."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members.items():
+            archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
+    return buffer.getvalue()
+
+
+def _array(kind: str, shape: tuple[int, int], content: bytes) -> bytes:
+    """A NumPy file that says this type and shape, whatever its content."""
+    head = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117).encode() + b"\n"
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head + content
 
 
 def nested(data: bytes, rng: np.random.Generator) -> bytes:
     """An archive with the file in it, in an archive, in an archive."""
     for _ in range(int(rng.integers(1, 4))):
-        buffer = io.BytesIO()
-        with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr(_undated("elevation.npy" if rng.random() < 0.5 else "../../elevation.npy"), data)
-        data = buffer.getvalue()
+        data = _archive({"elevation.npy" if rng.random() < 0.5 else "../../elevation.npy": data})
     return data
 
 
@@ -92,45 +97,30 @@ def repaired_zip(data: bytes, rng: np.random.Generator) -> bytes:
     """Changed arrays in a sound archive; a bomb of zeros; a pickle that would write a file."""
     if not data.startswith(b"PK"):
         return overwritten(data, rng)
-    which = int(rng.integers(4))
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
-    names = list(members)
-    name = names[int(rng.integers(len(names)))]
+    which, name = int(rng.integers(4)), list(members)[int(rng.integers(len(members)))]
     if which == 0:
-        shape = tuple(int(2 ** rng.uniform(0, 40)) for _ in range(2))
-        text = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".ljust(117).encode() + b"\n"
-        members[name] = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + b"\0" * 64
+        shape = int(2 ** rng.uniform(0, 40)), int(2 ** rng.uniform(0, 40))
+        members[name] = _array("<f8", shape, bytes(64))
     elif which == 1:
         return _archive_of_zeros(data, name)
     elif which == 2:
-        order = np.array(_Pickled(), dtype=object)
         buffer = io.BytesIO()
-        np.save(buffer, order, allow_pickle=True)
+        np.save(buffer, np.array(_Pickled(), dtype=object), allow_pickle=True)
         members[name] = buffer.getvalue()
     else:
         members[name] = flipped(members[name], rng)
     return _archive(members)
 
 
-def _archive(members: dict[str, bytes]) -> bytes:
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for each, content in members.items():
-            archive.writestr(_undated(each), content)
-    return buffer.getvalue()
-
-
 @cache
 def _archive_of_zeros(data: bytes, name: str) -> bytes:
-    """An archive in which one array says that it is far larger than what there is of it, which is zeros."""
-    edge = 20000
-    text = f"{{'descr': '|u1', 'fortran_order': False, 'shape': ({edge}, {edge}), }}".encode()
-    text = text.ljust(117) + b"\n"
+    """An archive in which one array says that it is far larger than its content, which is zeros."""
+    edge = 20_000
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = {each: archive.read(each) for each in archive.namelist()}
-    members[name] = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text + bytes(edge * edge // 16)
-    return _archive(members)
+    return _archive({**members, name: _array("|u1", (edge, edge), bytes(edge * edge // 16))})
 
 
 class _Pickled:
