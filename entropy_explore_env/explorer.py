@@ -8,7 +8,7 @@ every stop. What a robot is, and what its mission asks for, decides how it explo
 - Flying robots, and all in 3-D worlds: bits per time, with the recipe of narrow or of wide views.
 - Ground robots with a scanner that sees all around, in a plan, until the map has a given entropy: bits per
   time.
-- The same robots where everything is to be seen: frontier cells on short tours, see `planner.shared_tour`.
+- The same robots where everything is to be seen: frontier cells on short tours, see `planner.tour`.
   Bits per time would leave what is small until the end, and drive back for it.
 - The same robots where a part may stay unseen: bits per time, of unknown voxels alone.
 
@@ -22,7 +22,7 @@ import numpy as np
 
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_candidates import ViewProposer
-from entropy_explore_env.planner.shared_tour import SharedTour
+from entropy_explore_env.planner.tour import SharedTour
 from entropy_explore_env.planner.weights import PlannerWeights
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.settings import RobotKind

@@ -112,7 +112,7 @@ def run_mission(
         after_step: Called after the reset and after every step.
         before_step: Called with the actions before every step.
         options: Of the reset: where the robots start, and in which world.
-        backs_off: Whether robots that drift back off from what blocks them: see `planner.back_off`.
+        backs_off: Whether robots that drift back off from what blocks them: see `planner.driver`.
     """
     env.reset(seed=seed, options=options)
     if isinstance(strategy, Driver):

@@ -164,17 +164,7 @@ class CompiledStep:
             maps, estimates = (state.mean, state.precision), self.estimates_of(state)
             planning = Planning(params, actions, *shown, self._choices, *maps, no_fly, estimates)
             observed = Observed(*shown, state.heard, *maps, state.pooled, estimates)
-            proposing = Proposing(
-                params,
-                *shown,
-                state.heard,
-                *maps,
-                state.scan_utility_bits,
-                state.candidates,
-                state.experience,
-                no_fly,
-                estimates,
-            )
+            proposing = Proposing(params, state, no_fly, estimates)
             self._calls = calls = _Calls(arrays, planning, observed, proposing, None, None)
         return calls
 

@@ -17,7 +17,7 @@ from entropy_explore_env.missions.localization import believed_pose, estimate_in
 from entropy_explore_env.missions.observation.own_state import entropy_left
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
 from entropy_explore_env.missions.silence import silent_since
-from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.state import MissionEnd, MissionState
 from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
 from entropy_explore_env.planner.features import write_context, write_features, write_overlaps
 from entropy_explore_env.planner.model import Situation
@@ -29,61 +29,34 @@ _NONE = int(Kind.NONE)
 _WIDTH, _CONTEXT = len(FEATURES), len(CONTEXT)
 
 
-class RobotArrays(NamedTuple):
-    """What candidates are proposed to one robot from, beside its KNOWLEDGE, and where they are kept."""
+class Known(NamedTuple):
+    """What candidates are proposed to one robot from, and where they are kept."""
 
-    heard: np.ndarray
-    """(A,) HEARD."""
-    mean: np.ndarray
-    """(V,) float32."""
-    precision: np.ndarray
-    """(V,) float32."""
-    no_fly: np.ndarray
-    """(V,) bool, where its body would reach above the ceiling; (0,) = nowhere."""
-    candidates: np.ndarray
-    """(K,) CANDIDATE, its former ones; replaced."""
-    experience: np.record
-    """EXPERIENCE, changed in place."""
+    knowledge: np.record  # KNOWLEDGE
+    heard: np.ndarray  # (A,) HEARD
+    mean: np.ndarray  # (V,) float32
+    precision: np.ndarray  # (V,) float32
+    no_fly: np.ndarray  # (V,) bool, where its body would reach above the ceiling; (0,) = nowhere
+    candidates: np.ndarray  # (K,) CANDIDATE, its former ones; replaced
+    experience: np.record  # EXPERIENCE, changed in place
 
 
 class Proposing(NamedTuple):
-    """What candidates of E missions are proposed from, and where they are kept: arrays of MissionState."""
+    """What candidates of E missions are proposed from, and where they are kept."""
 
-    params: np.ndarray
-    """(A,) PARAMS."""
-    missions: np.ndarray
-    """(E,) MISSION."""
-    robots: np.ndarray
-    """(E, A) ROBOT."""
-    heard: np.ndarray
-    """(E, A, A) HEARD."""
-    mean: np.ndarray
-    """(E, A, V) float32."""
-    precision: np.ndarray
-    """(E, A, V) float32."""
-    utility_bits: np.ndarray
-    """(E, A, R) float64, of the rays of the latest scans."""
-    candidates: np.ndarray
-    """(E, A, K) CANDIDATE."""
-    experience: np.ndarray
-    """(E, A) EXPERIENCE."""
-    no_fly: np.ndarray
-    """(E·N, V) bool: see `navigation.Planning`."""
-    estimates: np.ndarray | None
-    """(E, A) ESTIMATE; None = all robots know where they are."""
+    params: np.ndarray  # (A,) PARAMS
+    state: MissionState  # candidates and experience are changed in place
+    no_fly: np.ndarray  # (E·N, V) bool: see `navigation.Planning`
+    estimates: np.ndarray | None  # (E, A) ESTIMATE; None = all robots know where they are
 
 
 @lean_kernel
 def locate(own, pose, target, variances, entropy_bits, knowledge):
     """Fill in where a robot is, how sure it is of that, where it goes, and what is left of its map.
 
-    Args:
-        own: Its PARAMS.
-        pose: (5,) where it believes to be, map frame.
-        target: (5,) the viewpoint that it chose last, map frame.
-        variances: Of its pose estimate: of its place, summed over the axes, m², and of its yaw, rad².
-        entropy_bits: Of its map.
-        knowledge: KNOWLEDGE, of which these are filled in.
+    The pose (5,) is the one that it believes, and the variances are those of its place, summed over the axes,
+    in m², and of its yaw, in rad². The target (5,) is the viewpoint that it chose last. Both are in the map
+    frame; in KNOWLEDGE they are in grid units.
     """
     copy_numbers(within_grid(own, pose), knowledge.pose, 3)
     copy_numbers(to_grid_units(own, target), knowledge.target, 3)
@@ -97,10 +70,10 @@ def locate(own, pose, target, variances, entropy_bits, knowledge):
 @lean_kernel
 def _fill_knowledge(proposing, mission, index, knowledge):
     """Fill in the KNOWLEDGE of a robot from the arrays of missions."""
-    own, params = proposing.robots[mission, index], proposing.params[index]
-    time_s, came = proposing.missions[mission].time_s, 0.0
+    state, params = proposing.state, proposing.params[index]
+    own, time_s, came = state.robots[mission, index], state.missions[mission].time_s, 0.0
     for ray in range(params.rays):
-        came += proposing.utility_bits[mission, index, ray]
+        came += state.scan_utility_bits[mission, index, ray]
     estimate = estimate_in(proposing.estimates, mission, index)
     pose = believed_pose(estimate, params, pose_at(params, own, time_s))
     locate(params, pose, own.target, pose_variance(estimate), own.entropy_bits, knowledge)
@@ -135,31 +108,26 @@ def _hear(params, robot, all_heard, time_s, scratch):
 
 
 @lean_kernel
-def propose_to(params, robot, knowledge, arrays, proposer, parts):
-    """Propose candidates to one robot.
+def propose_to(params, robot, known, proposer, parts):
+    """Propose candidates to one robot of a team with (A,) PARAMS, by what is Known to it.
 
-    Args:
-        params: (A,) PARAMS.
-        robot: Its number.
-        knowledge: KNOWLEDGE of it.
-        arrays: RobotArrays of it.
-        proposer: Proposer of its kind.
-        parts: (candidates, context, overlaps), each a (N,) float32 to fill in, of which any may be empty.
+    Filled in are the parts (candidates, context, overlaps) of its observation, each (N,) float32; any of them
+    may be empty.
     """
-    own, scratch, mean, precision = params[robot], proposer.scratch, arrays.mean, arrays.precision
+    own, scratch, mean, precision = params[robot], proposer.scratch, known.mean, known.precision
+    knowledge, candidates = known.knowledge, known.candidates
     for scan in (proposer.drawn, proposer.exact):
         scan.pose_variance[0], scan.pose_variance[1] = knowledge.place_variance, knowledge.yaw_variance
-    mates, cones = _hear(params, robot, arrays.heard, knowledge.time_s, scratch)
-    known, cost = proposer.exact.known_precision, proposer.unknown_cost
+    mates, cones = _hear(params, robot, known.heard, knowledge.time_s, scratch)
+    seen, cost = proposer.exact.known_precision, proposer.unknown_cost
     situation = Situation(
         knowledge,
         Belief(mean, precision, grid_size(own)),
-        Costs(mean, precision, known, cost, mean[:0], 1.0, arrays.no_fly),
+        Costs(mean, precision, seen, cost, mean[:0], 1.0, known.no_fly),
         scratch.cones[:cones],
         scratch.mates[:mates],
-        arrays.experience,
+        known.experience,
     )
-    candidates = arrays.candidates
     for k in range(len(candidates)):
         copy_numbers(to_grid_units(own, candidates[k].viewpoint), candidates[k].viewpoint, 3)
     features, context, overlaps = parts
@@ -167,7 +135,7 @@ def propose_to(params, robot, knowledge, arrays, proposer, parts):
     selection = propose(proposer, situation, candidates, described)
     if described:
         write_features(proposer, situation, selection, features)
-        write_context(proposer, situation, selection, context)
+        write_context(proposer, situation, selection.remaining, context)
     if len(overlaps) > 0:
         write_overlaps(proposer, selection.count, overlaps)
     for k in range(len(candidates)):
@@ -195,32 +163,34 @@ def propose_missions(proposing, proposer, kind, offsets, first, last, out):
         last: One past the last.
         out: (E, A, F) float32, of which those parts are filled in: with zeros for robots that do not decide.
     """
-    most, knowledge = proposing.candidates.shape[2], proposer.scratch.knowledge[0]
+    state, knowledge = proposing.state, proposer.scratch.knowledge[0]
+    most = state.candidates.shape[2]
     features, context = _end(offsets.candidates, most * _WIDTH), _end(offsets.context, _CONTEXT)
     overlaps, masked = _end(offsets.overlaps, most * most), _end(offsets.action_mask, most)
     for mission in range(first, last):
-        for index in range(proposing.robots.shape[1]):
-            own, params = proposing.robots[mission, index], proposing.params[index]
+        for index in range(state.robots.shape[1]):
+            own, params = state.robots[mission, index], proposing.params[index]
             if params.kind != kind:
                 continue
-            row, candidates = out[mission, index], proposing.candidates[mission, index]
+            row, candidates = out[mission, index], state.candidates[mission, index]
             parts = (
                 row[features[0] : features[1]],
                 row[context[0] : context[1]],
                 row[overlaps[0] : overlaps[1]],
             )
-            decides = own.deciding and proposing.missions[mission].end == _RUNNING
+            decides = own.deciding and state.missions[mission].end == _RUNNING
             if decides:
                 _fill_knowledge(proposing, mission, index, knowledge)
-                arrays = RobotArrays(
-                    proposing.heard[mission, index],
-                    proposing.mean[mission, index],
-                    proposing.precision[mission, index],
+                known = Known(
+                    knowledge,
+                    state.heard[mission, index],
+                    state.mean[mission, index],
+                    state.precision[mission, index],
                     proposing.no_fly[mission * params.bodies + params.body_number],
                     candidates,
-                    proposing.experience[mission, index],
+                    state.experience[mission, index],
                 )
-                propose_to(proposing.params, index, knowledge, arrays, proposer, parts)
+                propose_to(proposing.params, index, known, proposer, parts)
             else:
                 for part in parts:
                     for number in range(len(part)):

@@ -17,7 +17,6 @@ from entropy_explore_env.errors import RecordError
 from entropy_explore_env.missions.faults import COUNTED, OUTAGES
 from entropy_explore_env.missions.state import WAYPOINTS, MissionEnd
 from entropy_explore_env.planner.records import Kind
-from entropy_explore_env.planner.thresholds import REMEMBERED
 from entropy_explore_env.robots.map_summary import is_summary
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.range_sensor import Return
@@ -293,18 +292,17 @@ def _experience(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterato
     """EXPERIENCE."""
     kept = arrays["experience"]
     corners = _grid_corners(scenario)
-    for name in ("most_bits", "exponent", "best_rate", "far_value"):
+    for name in ("most_bits", "exponent", "far_value"):
         yield Values(f"experience.{name}", kept[name], 0.0, _HUGE)
     for name in ("decided_s", "decided_bits", "forget_at"):
         yield Values(f"experience.{name}", kept[name], 0.0, _MOST)
-    for name in ("going", "looked_far", "was_free"):
+    for name in ("going", "looked_far"):
         yield Values(f"experience.{name}", kept[name], 0, 1)
     yield Values("experience.patience", kept["patience"], -_MOST, _MOST)
     yield Values("experience.blocked", kept["blocked"], 0, _MOST)
-    yield Values("experience.failures", kept["failures"], 0, REMEMBERED)
+    yield Values("experience.failures", kept["failures"], 0, _MOST)
     yield from _poses("experience.goal", kept["goal"], *corners)
-    for name in ("far_at", "free_at"):
-        yield Values(f"experience.{name}", kept[name], *corners)
+    yield Values("experience.far_at", kept["far_at"], *corners)
     far = _farthest_m(scenario) / scenario.grid.voxel_size_m
     yield from _poses("experience.failed", kept["failed"], corners[0] - far, corners[1] + far)
     yield Values("experience.share", kept["share"], 0.0, 1.0)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
-from entropy_explore_env.missions.proposals import RobotArrays, locate, propose_to
+from entropy_explore_env.missions.proposals import Known, locate, propose_to
 from entropy_explore_env.missions.rules import Rules, rules_of
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
 from entropy_explore_env.planner.model import new_proposers
-from entropy_explore_env.planner.recipe import Recipe
 from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE, Kind
 from entropy_explore_env.scenario import Scenario
 
@@ -25,29 +22,23 @@ class ViewProposer:
     whose actions are candidates, but for the random numbers.
     """
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        rng: np.random.Generator,
-        overlaps: bool = False,
-        recipes: Mapping[int, Recipe] | None = None,
-    ) -> None:
+    def __init__(self, scenario: Scenario, rng: np.random.Generator, overlaps: bool = False) -> None:
         """Begin a mission.
 
         Args:
             scenario: With candidates as actions; views may be of a scenario with others.
             rng: The random streams of the robots are drawn from it.
             overlaps: Whether overlaps are wanted.
-            recipes: Number of a kind of robot → its recipe; None, and of others: `recipe_for`.
         """
         team, most = scenario.robots, scenario.action.candidates
         self._rules: Rules = rules_of(scenario)
-        self._proposers = new_proposers(scenario, recipes)
+        self._proposers = new_proposers(scenario)
         self._candidates = np.zeros((team, most), CANDIDATE)
         self._experience = np.zeros(team, EXPERIENCE)
         self._experience["candidates_rng"][:, 0] = rng.integers(0, 2**64, team, np.uint64)
-        self._features = np.zeros((team, most, len(FEATURES)), np.float32)
-        self._context = np.zeros((team, len(CONTEXT)), np.float32)
+        described = int(most > 1)  # a single one is the planner's own choice, with nothing to compare
+        self._features = np.zeros((team, most, described * len(FEATURES)), np.float32)
+        self._context = np.zeros((team, described * len(CONTEXT)), np.float32)
         self._overlaps = np.zeros((team, most, most if overlaps else 0), np.float32)
         self._proposed_s = np.full(team, -1.0)
 
@@ -77,7 +68,8 @@ class ViewProposer:
         known["gained_bits"], known["heard_bits"] = view.gained_bits, view.heard_bits
         known["move_end"], known["under_way"] = view.move_end.code, view.under_way
         known["teammates"] = len(params) - 1
-        arrays = RobotArrays(
+        about = Known(
+            known,
             view.heard.copy(),
             writable(view.mean),
             writable(view.precision),
@@ -86,7 +78,7 @@ class ViewProposer:
             self._experience[robot],
         )
         parts = (self._features[robot].reshape(-1), self._context[robot], self._overlaps[robot].reshape(-1))
-        propose_to(params, robot, known, arrays, proposer, parts)
+        propose_to(params, robot, about, proposer, parts)
 
     def features(self, robot: int) -> np.ndarray:
         """Return (K, F) float32 of the candidates proposed to a robot last: `candidate_features.FEATURES`."""

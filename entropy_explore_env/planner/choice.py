@@ -1,7 +1,4 @@
-"""The planner's own choice: the best viewpoint nearby or far away, or a way out where there is none.
-
-All in grid units; `proposer` and `situation` as in `nearby`.
-"""
+"""The planner's own choice: the best viewpoint nearby or far away, or a way out where there is none."""
 
 from __future__ import annotations
 
@@ -11,27 +8,22 @@ from entropy_explore_env.belief.paths.search import cost_to
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.planner.far import first_stop, gaze_on_the_way, propose_far
 from entropy_explore_env.planner.memory import copy_numbers, distance_apart, trust_and_clearance
-from entropy_explore_env.planner.nearby import start_paths
+from entropy_explore_env.planner.nearby import draw_viewpoint, start_paths
 from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.planner.states import PlannerState, next_state
 from entropy_explore_env.planner.thresholds import (
-    ENCLOSED_MARGIN,
     FAILED_SHARE,
     FAR_DECISIONS,
     FAR_DECISIONS_STRAIGHT,
     KEEP_GOAL,
-    LOW_GAIN,
     RANDOM_VIEWPOINTS,
     TRIED_STOPS,
 )
 from entropy_explore_env.randomness import draw_uniform
 from entropy_explore_env.viewpoints.evaluation import voxel_at
 
-_DRAWS = 64
-"""How often a random place is drawn until it lies within reach."""
 _SPOT, _NEAR, _FAR = int(Kind.SPOT), int(Kind.NEAR), int(Kind.FAR)
 _LEAVING, _WANDERING = int(PlannerState.LEAVING), int(PlannerState.WANDERING)
-_ENCLOSED = int(PlannerState.ENCLOSED)
 
 
 @lean_kernel
@@ -49,22 +41,14 @@ def _looks_far(proposer, situation, best):
 
 @lean_kernel
 def _add_far(proposer, situation, state, size, near, most):
-    """Add the first stops on the way to far places to the pool, and find the planner's far choice.
-
-    Args:
-        proposer: See `nearby`; paths within reach have been searched.
-        situation: See `nearby`.
-        state: PlannerState.
-        size: Viewpoints in the pool.
-        near: Number of the best one of them.
-        most: Stops that are added at most.
+    """Add at most `most` first stops to far places to the pool, whose best of `size` viewpoints is `near`.
 
     Returns:
         (size, choice): viewpoints in the pool then, and the number of the planner's choice.
     """
     scratch, experience, recipe = proposer.scratch, situation.experience, proposer.recipe
     far, pool, choice, first, value = scratch.far, scratch.pool, near, size, scratch.pool[near].value
-    count, best = propose_far(proposer, situation, state, pool[near].bits)
+    count, best = propose_far(proposer, situation, state)
     experience.far_value, experience.looked_far = best, True
     copy_numbers(situation.knowledge.pose, experience.far_at)
     experience.patience = FAR_DECISIONS if recipe.far_below >= 1.0 else FAR_DECISIONS_STRAIGHT
@@ -116,95 +100,32 @@ def _is_reached(proposer, situation, at):
 
 
 @lean_kernel
-def _put_beside(proposer, situation, step, at):
-    """Write the viewpoint on the voxel that lies some steps (x, y, z) from the robot's."""
-    here = situation.knowledge.pose
-    copy_numbers(here, at)
-    for axis in range(proposer.axes):
-        at[axis] = math.floor(here[axis]) + 0.5 + step[axis]
-
-
-@lean_kernel
-def _is_enclosed(proposer, situation):
-    """Return whether no path leads the robot away from the voxels that its body touches, by its belief."""
-    extent = 0
-    for offset in proposer.lattice.footprint:
-        for axis in range(3):
-            extent = max(extent, abs(offset[axis]))
-    half, at = extent + ENCLOSED_MARGIN, proposer.scratch.at
-    layers = 0 if proposer.planar else half
-    for x in range(-half, half + 1):
-        for y in range(-half, half + 1):
-            for z in range(-layers, layers + 1):
-                if max(abs(x), abs(y), abs(z)) == half:
-                    _put_beside(proposer, situation, (x, y, z), at)
-                    if _is_reached(proposer, situation, at):
-                        return False
-    return True
-
-
-@lean_kernel
 def _find_exit(proposer, situation, out):
-    """Fill in (5,) a neighbouring voxel through which an enclosed robot may leave.
-
-    The way out is the way that it came: of those that the search reached and that did not fail, the nearest
-    to where it was last free; else a random one.
-
-    Returns:
-        Whether there is any.
-    """
-    experience, at = situation.experience, proposer.scratch.at
-    knows_free = experience.was_free and distance_apart(experience.free_at, situation.knowledge.pose) >= 1.0
-    layers, best, found = 0 if proposer.planar else 1, math.inf, False
+    """Fill in (5,) a random one of the neighbouring voxels that the search reached and that did not fail."""
+    here, at, best = situation.knowledge.pose, proposer.scratch.at, 1.0
+    layers = 0 if proposer.planar else 1
     for x in range(-1, 2):
         for y in range(-1, 2):
             for z in range(-layers, layers + 1):
-                if x == 0 and y == 0 and z == 0:
+                copy_numbers(here, at)
+                step = (x, y, z)
+                for axis in range(proposer.axes):
+                    at[axis] = math.floor(here[axis]) + 0.5 + step[axis]
+                inside = x == 0 and y == 0 and z == 0
+                if inside or not _is_reached(proposer, situation, at):
                     continue
-                _put_beside(proposer, situation, (x, y, z), at)
-                if not _is_reached(proposer, situation, at):
-                    continue
-                if trust_and_clearance(proposer, situation, at) > 0.0:
-                    away = draw_uniform(experience.candidates_rng)
-                    if knows_free:
-                        away = distance_apart(experience.free_at, at)
-                    if away < best:
-                        best, found = away, True
-                        copy_numbers(at, out)
-    return found
-
-
-@lean_kernel
-def _draw_within_reach(proposer, situation, at):
-    """Draw a viewpoint, uniform within reach and inside the workspace, with any gaze."""
-    rng, here, size, reach = (
-        situation.experience.candidates_rng,
-        situation.knowledge.pose,
-        situation.belief.size,
-        proposer.reach,
-    )
-    copy_numbers(here, at)
-    for _ in range(_DRAWS):
-        squared = 0.0
-        for axis in range(proposer.axes):
-            low = max(min(0.5, here[axis]), here[axis] - reach)
-            high = min(max(size[axis] - 0.5, here[axis]), here[axis] + reach)
-            at[axis] = low + (high - low) * draw_uniform(rng)
-            squared += (at[axis] - here[axis]) ** 2
-        if squared <= reach * reach:
-            break
-        copy_numbers(here, at)
-    at[3] = math.pi * (2.0 * draw_uniform(rng) - 1.0)
-    if not proposer.level:
-        at[4] = math.asin(2.0 * draw_uniform(rng) - 1.0)
+                drawn = draw_uniform(situation.experience.candidates_rng)
+                if drawn < best and trust_and_clearance(proposer, situation, at) > 0.0:
+                    best = drawn
+                    copy_numbers(at, out)
 
 
 @lean_kernel
 def _draw_random(proposer, situation, out):
     """Fill in (5,) the most trusted of some random viewpoints, to which a path leads past teammates."""
-    at, best = proposer.scratch.at, -1.0
+    rng, at, best = situation.experience.candidates_rng, proposer.scratch.at, -1.0
     for _ in range(RANDOM_VIEWPOINTS):
-        _draw_within_reach(proposer, situation, at)
+        draw_viewpoint(proposer, situation, rng, at)
         trust = trust_and_clearance(proposer, situation, at)
         if proposer.planned and not _is_reached(proposer, situation, at):
             trust = 0.0
@@ -220,8 +141,8 @@ def choose(proposer, situation, state, size, most_far):
     """Add to the pool what the planner needs beside the viewpoints nearby, and choose as it does.
 
     Args:
-        proposer: See `nearby`; the best viewpoint nearby is the first of `scratch.order`.
-        situation: See `nearby`.
+        proposer: See `model`; the best viewpoint nearby is the first of `scratch.order`.
+        situation: See `model`.
         state: PlannerState after the latest scan.
         size: Viewpoints in the pool, all nearby.
         most_far: Far places that are added at most.
@@ -237,20 +158,11 @@ def choose(proposer, situation, state, size, most_far):
             start_paths(proposer, situation)
         size, best = _add_far(proposer, situation, state, size, best, most_far)
         experience.most_bits = max(experience.most_bits, pool[best].bits)
-    bits, other, encloses = pool[best].stop_bits, pool[size].viewpoint, False
-    stays = distance_apart(pool[best].viewpoint, here) == 0.0
-    if proposer.planned and stays and bits < LOW_GAIN * experience.most_bits:
-        if _is_enclosed(proposer, situation):
-            encloses = _find_exit(proposer, situation, other)
-        else:
-            experience.was_free = True
-            copy_numbers(here, experience.free_at)
-    gives_way = not encloses and experience.blocked > 0 and draw_uniform(experience.candidates_rng) < 0.5
-    state = next_state(experience.low_gain_scans, state == _LEAVING, bits, encloses, gives_way)
-    if state == _WANDERING:
-        _draw_random(proposer, situation, other)
-    elif state != _ENCLOSED:
+    gives_way = experience.blocked > 0 and draw_uniform(experience.candidates_rng) < 0.5
+    bits, other = pool[best].stop_bits, pool[size].viewpoint
+    if next_state(experience.low_gain_scans, state == _LEAVING, bits, gives_way) != _WANDERING:
         return size, best
+    _draw_random(proposer, situation, other)
     copy_numbers(other, pool[size].goal)
     pool[size].bits, pool[size].stop_bits, pool[size].value = 0.0, 0.0, 0.0
     pool[size].seconds = math.inf

@@ -10,7 +10,11 @@ A rule says where a robot goes by what it knows, and the driver does what no for
 - A robot to which its rule gives no viewpoint goes to random ones, each until its drive has ended.
 - A robot that would take the same scan again, although the latest one brought nothing, goes to a random
   viewpoint.
-- Robots that drift back off from what blocks them (`back_off`).
+- A robot that drifts backs off. It is wrong about its place, and so is its map: it may believe in a free
+  path for ever, or for ever expect a scan to bring what it does not bring. Where it was blocked twice in a
+  row, or chooses the place again to which it was blocked, it drives a few voxels in a random direction that
+  leads away from there, once more with each further block. One that stayed at the same place for many
+  decisions goes to a random viewpoint.
 
 A rule overrides one of the methods `give_way`, `make_room` and `note_blocked` where its paper says what a
 robot does.
@@ -24,16 +28,23 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, random_viewpoint
-from entropy_explore_env.planner.back_off import BackOff
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import Scenario
 
 _ASIDE = 2
 """How often in a row a robot steps aside before it makes room."""
 _MOST_DECISIONS = 4
-"""Most decisions for which a robot makes room after a block."""
+"""Most decisions for which a robot makes room, or backs off, after a block."""
 _NOTHING = 0.01
 """A scan that brings less than this share of the most that one brought has brought nothing."""
+_SAME_EDGES = 1.5
+"""Places nearer than this, in voxel edges, are the same to a robot that drifts."""
+_STANDS = 15
+"""Decisions at the same place after which it goes elsewhere: one for each direction of a narrow view."""
+_DRAWS = 16
+"""Directions drawn at most until one leads away from where it was blocked."""
+_BACK_EDGES = 2.0, 6.0
+"""Shortest and longest way back, in voxel edges: a far goal would lead through the same first corner."""
 
 
 @dataclass
@@ -55,9 +66,18 @@ class Trail:
     room: int = 0
     """Decisions for which it still makes room."""
     blocked: int = 0
-    """Number of drives in a row that were blocked by what does not move."""
+    """Number of drives of its rule in a row that were blocked by what does not move."""
     most_bits: float = 0.0
     """Most bits that a scan brought."""
+    blocks: int = 0
+    """Number of any drives in a row that were blocked; like what follows, of robots that drift."""
+    blocked_aim: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))
+    """(3,) where it meant to go when it was blocked last."""
+    away: int = 0
+    """Decisions for which it still backs off."""
+    stood_at: np.ndarray = field(default_factory=lambda: np.full(3, np.inf))
+    stands: int = 0
+    """Number of decisions in a row near `stood_at`."""
 
 
 class Driver(ABC):
@@ -69,7 +89,6 @@ class Driver(ABC):
     """Number of blocked drives in a row after which a robot goes to a random viewpoint; 0 = it never does."""
     repeats = False
     """Whether robots may take the same scan again although it brought nothing."""
-
     backs_off = True
     """Whether robots that drift back off from what blocks them."""
 
@@ -77,7 +96,7 @@ class Driver(ABC):
         """Begin a mission."""
         self._scenario, self._rng = scenario, rng
         self._trails = [Trail() for _ in range(scenario.robots)]
-        self._back_off = BackOff(scenario, rng) if scenario.drifts and self.backs_off else None
+        self._back_off_rng = rng.spawn(1)[0] if scenario.drifts and self.backs_off else None
 
     @abstractmethod
     def decide(self, view: RobotKnowledge) -> np.ndarray | None:
@@ -130,8 +149,8 @@ class Driver(ABC):
                 viewpoint, trail.follows = random_viewpoint(view, self._rng), False
         if trail.follows:
             trail.random = None
-        if self._back_off is not None:
-            viewpoint = self._back_off.mended(view, viewpoint)
+        if self._back_off_rng is not None and not view.under_way and view.covariance.any():
+            viewpoint = self._backed_off(view, trail, viewpoint, self._back_off_rng)
         trail.viewpoint = viewpoint.copy()
         return viewpoint
 
@@ -169,10 +188,50 @@ class Driver(ABC):
         """Whether a scan at a viewpoint would only repeat the latest one, which brought nothing."""
         came_bits = float(view.scan.utility_bits.sum())
         trail.most_bits = max(trail.most_bits, came_bits)
-        apart_m = float(np.linalg.norm(viewpoint[:3] - view.pose[:3]))
-        stands = not view.under_way and apart_m < 0.5 * self._scenario.grid.voxel_size_m
+        stands = not view.under_way and self._is_near(viewpoint[:3], view.pose[:3], 0.5)
         same = bool(np.allclose(viewpoint, trail.viewpoint))
         return stands and same and came_bits < _NOTHING * trail.most_bits
+
+    def _backed_off(
+        self, view: RobotKnowledge, trail: Trail, viewpoint: np.ndarray, rng: np.random.Generator
+    ) -> np.ndarray:
+        """Return the viewpoint (5,) that was chosen, or one away from what blocks a robot that drifts."""
+        if view.move_end.blocked:
+            trail.blocks, trail.blocked_aim = trail.blocks + 1, trail.viewpoint[:3]
+            if trail.blocks >= 2:
+                trail.away = min(trail.blocks - 1, _MOST_DECISIONS)
+        else:
+            trail.blocks = 0
+        if self._is_near(view.pose[:3], trail.stood_at, _SAME_EDGES):
+            trail.stands += 1
+        else:
+            trail.stood_at, trail.stands = view.pose[:3].copy(), 0
+        again = self._is_near(viewpoint[:3], trail.blocked_aim, _SAME_EDGES)
+        if trail.away > 0 or (trail.blocks > 0 and again):
+            trail.away = max(trail.away - 1, 0)
+            return self._back(view, trail.blocked_aim, rng)
+        if trail.stands < _STANDS:
+            return viewpoint
+        trail.stands = 0
+        return random_viewpoint(view, rng)
+
+    def _is_near(self, place: np.ndarray, other: np.ndarray, edges: float) -> bool:
+        return bool(np.linalg.norm(place - other) < edges * self._scenario.grid.voxel_size_m)
+
+    def _back(self, view: RobotKnowledge, blocked_aim: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Return a viewpoint (5,) a few voxels off, away from where the robot was blocked, with any gaze."""
+        viewpoint, grid, here = random_viewpoint(view, rng), self._scenario.grid, view.pose[:3]
+        axes = 2 if view.planar else 3
+        for _ in range(_DRAWS):
+            step = np.zeros(3)
+            step[:axes] = rng.normal(size=axes)
+            if float((blocked_aim - here) @ step) <= 0.0:
+                break
+        far_m = min(rng.uniform(*_BACK_EDGES) * grid.voxel_size_m, view.kind.robot.reach_m)
+        low = np.asarray(grid.origin_m)
+        place = here + far_m * step / max(float(np.linalg.norm(step)), 1e-9)
+        viewpoint[:axes] = np.clip(place, low, low + grid.size_m)[:axes]
+        return viewpoint
 
 
 def nearest_teammate(view: RobotKnowledge) -> int:

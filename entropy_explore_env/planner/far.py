@@ -1,7 +1,4 @@
-"""Far places that could be worth more than any nearer one, and the first stops on the way to them.
-
-All in grid units; `proposer` and `situation` as in `nearby`.
-"""
+"""Far places that could be worth more than any nearer one, and the first stops on the way to them."""
 
 from __future__ import annotations
 
@@ -16,13 +13,13 @@ from entropy_explore_env.planner.far_places import BitCount, fill_blocks, promis
 from entropy_explore_env.planner.memory import copy_numbers, distance_apart, value_of, worth_bits
 from entropy_explore_env.planner.nearby import evaluate
 from entropy_explore_env.planner.states import PlannerState
-from entropy_explore_env.planner.thresholds import FAR_PITCH_RAD, FIRST_RADIUS, FURTHER_BATCHES, LOW_GAIN
+from entropy_explore_env.planner.thresholds import FAR_PITCH_RAD, FIRST_RADIUS
 from entropy_explore_env.randomness import draw_gaussian, draw_uniform
 from entropy_explore_env.viewpoints.evaluation import travel_seconds, voxel_at
 from entropy_explore_env.viewpoints.expected_scan import expected_bits
 
 _DEPLETED = int(PlannerState.DEPLETED)
-WITHIN = 1.0 - 1e-6
+_WITHIN = 1.0 - 1e-6
 """Share of the reach that is used: actions are float32."""
 
 
@@ -50,7 +47,7 @@ def _put_at(proposer, situation, voxel, at):
 def _insert(worths, options, at, worth, count):
     """Insert a viewpoint among those that are worth most, in order, and return how many there are."""
     most = len(worths)
-    if count == most and worth <= worths[count - 1]:
+    if most == 0 or (count == most and worth <= worths[count - 1]):
         return count
     place = min(count, most - 1)
     while place > 0 and worths[place - 1] < worth:
@@ -63,21 +60,16 @@ def _insert(worths, options, at, worth, count):
 
 
 @lean_kernel
-def _fill_far(proposer, situation, options, below):
+def _fill_far(proposer, situation, state, options):
     """Fill in the places of the blocks that promise most for the time, a few gazes each; return how many.
 
-    Args:
-        proposer: See `nearby`; its blocks have been counted. The worths are left in `scratch.worth`.
-        situation: See `nearby`.
-        options: (F,) OPTION whose viewpoints are filled in.
-        below: Only places that are worth less than this; inf = all.
+    Openings that no gaze gets to promise much and bring nothing; where many are nearby, they would hide what
+    is left in other places. So a DEPLETED planner weighs each place by chance.
     """
     scratch, blocks, recipe, drive = proposer.scratch, proposer.blocks, proposer.recipe, proposer.drive
     size, here, shape, at = situation.belief.size, situation.knowledge.pose, blocks.bits.shape, scratch.at
     worths, gazes, edge_m = scratch.worth[: recipe.far_places], recipe.far_gazes, proposer.exact.voxel_size_m
-    if recipe.far_places == 0:
-        return 0
-    count = 0
+    rng, count = situation.experience.candidates_rng, 0
     for i in range(shape[0]):
         for j in range(shape[1]):
             for k in range(shape[2]):
@@ -87,77 +79,28 @@ def _fill_far(proposer, situation, options, below):
                     _put_at(proposer, situation, place, at)
                     seconds = travel_seconds(scratch.search, size, drive, edge_m, here, at, proposer.reach)
                     worth = value_of(situation, bits, seconds)
-                    if worth < below:
-                        count = _insert(worths, options, at, worth, count)
+                    if state == _DEPLETED:
+                        worth *= draw_uniform(rng)
+                    count = _insert(worths, options, at, worth, count)
     for place in range(count - 1, -1, -1):
         for gaze in range(gazes - 1, -1, -1):
             copy_numbers(options[place].viewpoint, options[place * gazes + gaze].viewpoint)
     for number in range(count * gazes):
-        _draw_gaze(proposer, situation.experience.candidates_rng, options[number].viewpoint)
+        _draw_gaze(proposer, rng, options[number].viewpoint)
     return count * gazes
 
 
 @lean_kernel
-def _evaluate_far(proposer, situation, options):
-    """Evaluate viewpoints at far places, and return the largest (value, bits) among them."""
-    evaluate(proposer, situation, proposer.exact, options, True, proposer.reach)
-    best, most = 0.0, 0.0
-    for k in range(len(options)):
-        best, most = max(best, options[k].value), max(most, options[k].bits)
-    return best, most
-
-
-@lean_kernel
-def _evaluate_further(proposer, situation, count, best, enough):
-    """Go on to places that promise less, where those that promise most would bring little.
-
-    Openings that no gaze gets to promise much and bring nothing; where many are nearby, they would hide
-    what is left in other places. So the next best places are evaluated, and those after them, as long as
-    one of them could be worth more than the best that was found; the better ones replace the worse.
-
-    Args:
-        proposer: See `nearby`; `scratch.far` holds `count` viewpoints that may be replaced.
-        situation: See `nearby`.
-        count: Number of these viewpoints.
-        best: What the best one is worth.
-        enough: Bits of a viewpoint from which on no further ones are looked for.
-
-    Returns:
-        What the best one is worth then.
-    """
-    scratch, recipe = proposer.scratch, proposer.recipe
-    far, further, all_of_them = scratch.far, scratch.further, recipe.far_places * recipe.far_gazes
-    for _ in range(FURTHER_BATCHES):
-        if count == 0 or count < all_of_them or scratch.worth[recipe.far_places - 1] <= best:
-            break
-        found = _fill_far(proposer, situation, further, scratch.worth[recipe.far_places - 1])
-        value, bits = _evaluate_far(proposer, situation, further[:found])
-        for number in range(found):
-            worst = 0
-            for other in range(count):
-                if far[other].value < far[worst].value:
-                    worst = other
-            if further[number].value > far[worst].value:
-                far[worst] = further[number]
-        best = max(best, value)
-        if bits >= enough or found < all_of_them:
-            break
-    return best
-
-
-@lean_kernel
-def propose_far(proposer, situation, state, near_bits):
+def propose_far(proposer, situation, state):
     """Fill `scratch.far` with far viewpoints, evaluated; the nearer half of the world first.
 
     Paths are searched farther and farther until no place beyond could be worth more. The goal to which the
-    robot is on its way comes last, if there is one. A DEPLETED planner that finds nothing better evaluates
-    further ones.
+    robot is on its way comes last, if there is one.
 
     Args:
-        proposer: See `nearby`; paths within reach have been searched.
-        situation: See `nearby`.
+        proposer: See `model`; paths within reach have been searched.
+        situation: See `model`.
         state: PlannerState.
-        near_bits: Those that the best viewpoint nearby should bring.
 
     Returns:
         (count, value): how many there are, and what the best is worth.
@@ -166,35 +109,31 @@ def propose_far(proposer, situation, state, near_bits):
     far, size, recipe = scratch.far, belief.size, proposer.recipe
     start = voxel_at(size, situation.knowledge.pose)
     everywhere = float(size[0] + size[1] + size[2]) * proposer.unknown_cost
-    radius, enough = FIRST_RADIUS * proposer.within, LOW_GAIN * experience.most_bits
+    radius = FIRST_RADIUS * proposer.within
     count_of = BitCount(proposer.target_precision, proposer.exact.known_precision, recipe.behind)
     while True:
         radius = min(radius, everywhere)
         resume_search(scratch.search, proposer.lattice, situation.costs, radius)
         window = math.ceil(radius)
         fill_blocks(scratch.search, belief, count_of, proposer.lattice.layer, start, window, proposer.blocks)
-        count = drawn = _fill_far(proposer, situation, far, math.inf)
+        count, best = _fill_far(proposer, situation, state, far), 0.0
         if experience.going:
             copy_numbers(experience.goal, far[count].viewpoint)
             count += 1
-        best, bits = _evaluate_far(proposer, situation, far[:count])
+        evaluate(proposer, situation, proposer.exact, far[:count], True)
+        for number in range(count):
+            best = max(best, far[number].value)
         seconds = max(radius * proposer.exact.voxel_size_m / proposer.drive.max_speed_m_s, 1e-9)
         if radius >= everywhere or best >= value_of(situation, experience.most_bits, seconds):
-            if state == _DEPLETED and max(near_bits, bits) < enough:
-                best = _evaluate_further(proposer, situation, drawn, best, enough)
             return count, best
         radius *= 2.0
 
 
 @lean_kernel
 def first_stop(proposer, situation, goal, stop):
-    """Fill in where a robot has to drive first to get to a goal.
+    """Fill in the stop (5,) to which a robot drives first to get to a goal (5,) that the search reached.
 
-    Args:
-        proposer: See `nearby`, with the search that reached the goal.
-        situation: See `nearby`.
-        goal: (5,) the viewpoint to get to.
-        stop: (5,) filled in: the goal where it is within reach, or the last place of the path that is.
+    It is the goal where that is within reach, else the last place of the path that is.
 
     Returns:
         Whether there is a path.
@@ -205,7 +144,7 @@ def first_stop(proposer, situation, goal, stop):
     count = extract_path(search, lattice, voxel_at(size, goal), path)
     if count == 0:
         return False
-    reach = proposer.reach * WITHIN
+    reach = proposer.reach * _WITHIN
     if not proposer.planned:
         way = Path(path, count, here[:3], goal[:3])
         if string_pull(search, lattice, situation.costs, way, scratch.waypoints) == 0:
@@ -232,14 +171,9 @@ def first_stop(proposer, situation, goal, stop):
 
 @lean_kernel
 def gaze_on_the_way(proposer, situation, gazes, goal, stop):
-    """Give a stop on the way to a goal the best of some gazes, and return the bits that a scan should bring.
+    """Give a stop (5,) on the way to a goal (5,) the best of some gazes, and return the bits of a scan there.
 
-    Args:
-        proposer: See `nearby`.
-        situation: See `nearby`.
-        gazes: How many are tried at most, of which the goal's is the first one.
-        goal: (5,) the viewpoint to get to.
-        stop: (5,) its place and the goal's gaze; the best gaze is filled in.
+    At most `gazes` are tried, of which the goal's is the first one.
     """
     scratch, most = proposer.scratch, -1.0
     tried = scratch.at

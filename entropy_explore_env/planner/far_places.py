@@ -29,25 +29,18 @@ _FOLD_ABOVE = 1e250
 class BitCount(NamedTuple):
     """Which bits are counted."""
 
-    target_precision: float
-    """1/σ² of a voxel at which nothing remains to be gained."""
-    known_precision: float
-    """1/σ² from which on a voxel counts as seen."""
-    behind: float
-    """Bits that an opening promises, in multiples of its own."""
+    target_precision: float  # 1/σ² of a voxel at which nothing remains to be gained
+    known_precision: float  # 1/σ² from which on a voxel counts as seen
+    behind: float  # Bits that an opening promises, in multiples of its own
 
 
 class Blocks(NamedTuple):
     """Blocks of a belief, I, J, K along the axes."""
 
-    edge: int
-    """Voxels along a block's edge."""
-    bits: np.ndarray
-    """(I, J, K) float64, remaining bits; 0 outside the window that was looked at."""
-    promised: np.ndarray
-    """(I, J, K) float64, bits that openings and known voxels promise."""
-    place: np.ndarray
-    """(I, J, K) int64, the known free voxel reached nearest to the block's centre, or NOT_REACHED."""
+    edge: int  # Voxels along a block's edge
+    bits: np.ndarray  # (I, J, K) float64, remaining bits; 0 outside the window that was looked at
+    promised: np.ndarray  # (I, J, K) float64, bits that openings and known voxels promise
+    place: np.ndarray  # (I, J, K) int64, known free voxel nearest to its centre, or NOT_REACHED
 
 
 def new_blocks(shape: tuple[int, int, int], edge: int) -> Blocks:

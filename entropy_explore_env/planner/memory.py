@@ -1,4 +1,4 @@
-"""What a robot remembers of its decisions, and how far it trusts what it expects; in grid units."""
+"""What a robot remembers of its decisions, and how far it trusts what it expects."""
 
 from __future__ import annotations
 
@@ -74,9 +74,9 @@ def learn(experience, candidates, knowledge, number, came_bits, body_radius):
         experience: EXPERIENCE, changed in place.
         candidates: (K,) CANDIDATE among which the robot chose.
         knowledge: KNOWLEDGE.
-        number: Of the candidate that it chose; -1 = something else.
+        number: Number of the candidate that it chose; -1 = something else.
         came_bits: Bits of its latest scan that count.
-        body_radius: Radius of the robot, voxel edges.
+        body_radius: Radius of the robot.
     """
     here, target = knowledge.pose, knowledge.target
     if number >= 0 or not knowledge.under_way:  # a robot under way to what is out of reach keeps its goal
@@ -126,7 +126,7 @@ def weigh_time(recipe, experience, knowledge):
     seconds = max(knowledge.time_s - experience.decided_s, 1e-9)
     mean_rate = knowledge.gained_bits / max(knowledge.time_s, 1e-9)
     leaves = not knowledge.under_way and came / seconds < recipe.leave_below * mean_rate
-    state = next_state(experience.low_gain_scans, leaves, math.inf, False, False)
+    state = next_state(experience.low_gain_scans, leaves, math.inf, False)
     if knowledge.under_way:
         return state
     exponent = recipe.exponent if state == _EXPLORING else min(recipe.exponent, 1.0)
@@ -144,34 +144,19 @@ def value_of(situation, bits, seconds):
 
 @lean_kernel
 def _forget(experience, here):
-    """Forget the failures that lie far behind."""
-    kept = 0
-    for number in range(experience.failures):
-        if distance_apart(experience.failed[number], here) < experience.forget_at[number]:
-            _move_failure(experience, number, kept)
-            kept += 1
-    experience.failures = kept
-
-
-@lean_kernel
-def _move_failure(experience, source, target):
-    """Write a failure in place of another."""
-    copy_numbers(experience.failed[source], experience.failed[target])
-    experience.share[target] = experience.share[source]
-    experience.forget_at[target] = experience.forget_at[source]
+    """Forget the failures that lie far behind: as if all of the expected bits had come."""
+    for number in range(min(experience.failures, REMEMBERED)):
+        if distance_apart(experience.failed[number], here) >= experience.forget_at[number]:
+            experience.share[number] = 1.0
 
 
 @lean_kernel
 def _remember(experience, viewpoint, share, forget_at):
     """Remember a failure, in place of the oldest one where there is no room."""
-    if experience.failures == REMEMBERED:
-        for number in range(REMEMBERED - 1):
-            _move_failure(experience, number + 1, number)
-        experience.failures = REMEMBERED - 1
-    number = experience.failures
+    number = experience.failures % REMEMBERED
     copy_numbers(viewpoint, experience.failed[number])
     experience.share[number], experience.forget_at[number] = share, forget_at
-    experience.failures = number + 1
+    experience.failures += 1
 
 
 @lean_kernel
@@ -193,11 +178,12 @@ def trust_in(experience, all_around, at):
     Where many gazes of one place failed, wider and wider ones around each count as alike: what hides from a
     robot what it expects to see, as a teammate's body does, hides it from every gaze that way.
     """
-    trust, here = 1.0, 0
-    for number in range(experience.failures):
-        here += int(distance_apart(experience.failed[number], at) < SAME_PLACE)
+    trust, here, count = 1.0, 0, min(experience.failures, REMEMBERED)
+    for number in range(count):
+        there = distance_apart(experience.failed[number], at) < SAME_PLACE
+        here += int(there and experience.share[number] < 1.0)
     alike_rad = SAME_GAZE_RAD * (1 + max(here - FAILED_GAZES, 0))
-    for number in range(experience.failures):
+    for number in range(count):
         failed, share = experience.failed[number], experience.share[number]
         if distance_apart(failed, at) >= SAME_PLACE:
             continue

@@ -1,7 +1,4 @@
-"""Viewpoints on the spot and within reach: drawn, then refined around the best; in grid units.
-
-Here and in the modules above, `proposer` is a Proposer of the robot's kind and `situation` a Situation.
-"""
+"""Viewpoints on the spot and within reach: drawn, then refined around the best."""
 
 from __future__ import annotations
 
@@ -66,7 +63,17 @@ def _draw_place(proposer, situation, rng, at):
 
 
 @lean_kernel
-def draw_nearby(proposer, situation):
+def draw_viewpoint(proposer, situation, rng, at):
+    """Draw a viewpoint within reach, with any gaze."""
+    copy_numbers(situation.knowledge.pose, at)
+    at[3] = math.pi * (2.0 * draw_uniform(rng) - 1.0)
+    at[4] = math.asin(2.0 * draw_uniform(rng) - 1.0)
+    _draw_place(proposer, situation, rng, at)
+    _normalise(proposer, at, situation.knowledge.pose[4])
+
+
+@lean_kernel
+def _draw_nearby(proposer, situation):
     """Draw gazes around the present one, any gazes on the spot, and places; return how many these are."""
     recipe, rng, here = proposer.recipe, situation.experience.candidates_rng, situation.knowledge.pose
     count = recipe.gazes + recipe.turns + recipe.places
@@ -108,19 +115,14 @@ def _vary(proposer, situation, spread, at):
 
 
 @lean_kernel
-def evaluate(proposer, situation, scan, options, along_paths, reach):
-    """Fill in what viewpoints are worth.
+def evaluate(proposer, situation, scan, options, far):
+    """Fill in what viewpoints (N,) OPTION are worth, with scans imagined by a ScanModel.
 
-    Args:
-        proposer: See the top of the file.
-        situation: See the top of the file.
-        scan: The ScanModel by which scans are imagined.
-        options: (N,) OPTION; all but their viewpoints is filled in.
-        along_paths: Whether the robot gets there along paths, which have been searched; else straight.
-        reach: Longest drive on a path, voxel edges, with a scan after each; inf = one drive.
+    To those that are `far` it drives along paths, which have been searched, with a scan after each reach.
     """
     scratch, belief, here = proposer.scratch, situation.belief, situation.knowledge.pose
-    drive, edge_m = proposer.drive, scan.voxel_size_m
+    drive, edge_m, along_paths = proposer.drive, scan.voxel_size_m, far or proposer.planned
+    reach = proposer.reach if far else math.inf
     for k in range(len(options)):
         option = options[k]
         at = option.viewpoint
@@ -160,9 +162,8 @@ def propose_nearby(proposer, situation):
         How many there are in the pool.
     """
     pool, order, recipe = proposer.scratch.pool, proposer.scratch.order, proposer.recipe
-    planned = proposer.planned
-    size = draw_nearby(proposer, situation)
-    evaluate(proposer, situation, proposer.drawn, pool[:size], planned, math.inf)
+    size = _draw_nearby(proposer, situation)
+    evaluate(proposer, situation, proposer.drawn, pool[:size], False)
     for k in range(size):
         order[k] = k
     count, spread = size, proposer.refined_rad
@@ -177,8 +178,8 @@ def propose_nearby(proposer, situation):
         if number == 0 and recipe.draw_thinning != 1:
             for k in range(best):
                 drawn = pool[order[k] : order[k] + 1]
-                evaluate(proposer, situation, proposer.exact, drawn, planned, math.inf)
-        evaluate(proposer, situation, proposer.exact, pool[first:size], planned, math.inf)
+                evaluate(proposer, situation, proposer.exact, drawn, False)
+        evaluate(proposer, situation, proposer.exact, pool[first:size], False)
         count = best + size - first
         for k in range(first, size):
             order[best + k - first] = k

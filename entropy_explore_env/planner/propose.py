@@ -1,7 +1,4 @@
-"""A robot's candidates, from what it knows: drawn, refined, chosen, selected, and described.
-
-All in grid units; `proposer` and `situation` as in `nearby`.
-"""
+"""A robot's candidates, from what it knows: drawn, refined, chosen, selected, and described."""
 
 from __future__ import annotations
 
@@ -24,16 +21,13 @@ _NONE, _FAR = int(Kind.NONE), int(Kind.FAR)
 
 @lean_kernel
 def propose(proposer, situation, candidates, described):
-    """Propose candidates to a robot; what they are is left in `proposer.scratch`.
+    """Propose candidates to a robot, and return a Selection; what they are is left in `proposer.scratch`.
 
     Args:
-        proposer: See `nearby`.
-        situation: See `nearby`; its experience is changed in place.
+        proposer: See `model`.
+        situation: See `model`.
         candidates: (K,) CANDIDATE in grid units, those among which it chose; replaced.
         described: Whether features will be written.
-
-    Returns:
-        Selection.
     """
     knowledge, experience, scratch = situation.knowledge, situation.experience, proposer.scratch
     belief, pool = situation.belief, scratch.pool
@@ -44,12 +38,8 @@ def propose(proposer, situation, candidates, described):
     state = weigh_time(proposer.recipe, experience, knowledge)
     if proposer.planned:
         start_paths(proposer, situation)
-    near = size = propose_nearby(proposer, situation)
-    near_value, far_value = pool[scratch.order[0]].value, 0.0
+    size = propose_nearby(proposer, situation)
     size, choice = choose(proposer, situation, state, size, most_far_of(len(candidates)))
-    for k in range(near, size):
-        if pool[k].kind == _FAR:
-            far_value = max(far_value, pool[k].value)
     kept = -1
     if knowledge.under_way:
         kept, size = size, size + 1
@@ -61,8 +51,14 @@ def propose(proposer, situation, candidates, described):
     remaining = 0.0
     if described:
         remaining = fill_remaining(belief, proposer.target_precision, proposer.blocks)
-    _write_candidates(proposer, knowledge.pose, candidates, count)
-    return Selection(count, kept, near_value, far_value, remaining)
+    for k in range(len(candidates)):
+        option, candidate = pool[scratch.taken[k if k < count else 0]], candidates[k]
+        _pull_within(proposer, knowledge.pose, option.viewpoint)
+        copy_numbers(option.viewpoint, candidate.viewpoint)
+        copy_numbers(option.goal, candidate.goal)
+        candidate.bits = option.stop_bits
+        candidate.kind = option.kind if k < count else _NONE
+    return Selection(count, kept, remaining)
 
 
 @lean_kernel
@@ -89,7 +85,7 @@ def _keep_target(proposer, situation, number):
     for axis in range(3):
         at[axis] = min(max(at[axis], 0.0), float(situation.belief.size[axis]))
     _pull_within(proposer, knowledge.pose, at)
-    evaluate(proposer, situation, proposer.exact, options, proposer.planned, math.inf)
+    evaluate(proposer, situation, proposer.exact, options, False)
     if experience.going:
         copy_numbers(experience.goal, options[0].goal)
         options[0].kind = _FAR
@@ -102,16 +98,3 @@ def _pull_within(proposer, here, at):
     if length > proposer.reach:
         for axis in range(3):
             at[axis] = here[axis] + (at[axis] - here[axis]) * proposer.reach / length
-
-
-@lean_kernel
-def _write_candidates(proposer, here, candidates, count):
-    """Write down the candidates; those beyond `count` are none, with the viewpoint of the first one."""
-    pool, taken = proposer.scratch.pool, proposer.scratch.taken
-    for k in range(len(candidates)):
-        option, candidate = pool[taken[k if k < count else 0]], candidates[k]
-        _pull_within(proposer, here, option.viewpoint)
-        copy_numbers(option.viewpoint, candidate.viewpoint)
-        copy_numbers(option.goal, candidate.goal)
-        candidate.bits = option.stop_bits
-        candidate.kind = option.kind if k < count else _NONE

@@ -11,43 +11,30 @@ import math
 from typing import NamedTuple
 
 from entropy_explore_env.settings import RobotKind
-from entropy_explore_env.validation import check, check_count, check_not_negative, check_positive
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
 
 
 class Recipe(NamedTuple):
-    """How viewpoints are drawn and scored, in plain numbers that kernels take; see `checked`."""
+    """How viewpoints are drawn and scored."""
 
-    exponent: float
-    """c of bits / s^c."""
-    stop_probability: float
-    """Probability that an unknown voxel stops an imagined ray."""
-    gap_probability: float
-    """Probability that an unknown voxel beside a covered one stops an imagined ray."""
+    exponent: float  # c of bits / s^c
+    stop_probability: float  # probability that an unknown voxel stops an imagined ray
+    gap_probability: float  # probability that an unknown voxel beside a covered one stops an imagined ray
     draw_thinning: int
     """One in this many columns, and rows, of the sensor's rays is imagined for viewpoints that are drawn; for
     those that are refined, and for far places, all rays are."""
-    gazes: int
-    """Viewpoints that are drawn around the present gaze, on the spot."""
-    turns: int
-    """Viewpoints that are drawn on the spot with any gaze."""
-    places: int
-    """Viewpoints that are drawn within reach with any gaze."""
-    refinements: int = 2
-    """How often viewpoints are drawn around the best ones so far."""
-    refined: int = 12
-    """Viewpoints that are drawn in each refinement."""
-    far_places: int = 24
-    """Known free places that are evaluated beyond those within reach."""
-    far_gazes: int = 1
-    """Gazes that are evaluated at each far place."""
-    waypoint_gazes: int = 1
-    """Gazes that are evaluated at a stop on the way to a far place."""
+    gazes: int  # viewpoints that are drawn around the present gaze, on the spot
+    turns: int  # viewpoints that are drawn on the spot with any gaze
+    places: int  # viewpoints that are drawn within reach with any gaze
+    refinements: int = 2  # how often viewpoints are drawn around the best ones so far
+    refined: int = 12  # viewpoints that are drawn in each refinement
+    far_places: int = 24  # known free places that are evaluated beyond those within reach
+    far_gazes: int = 1  # gazes that are evaluated at each far place
+    waypoint_gazes: int = 1  # gazes that are evaluated at a stop on the way to a far place
     far_below: float = 1.0
     """Far places are looked for where the best viewpoint nearby brings less than this share of the most bits
     ever expected; 1 = whenever one could be worth more."""
-    block_m: float = 1.0
-    """Edge of the blocks that far places are taken from, in metres."""
+    block_m: float = 1.0  # edge of the blocks that far places are taken from, in metres
     known_ground_share: float = 0.0
     """Bits that a scan of known ground still brings, as a share of the most bits ever expected of a scan;
     bits up to that are worth next to nothing, and bits above count without them."""
@@ -57,33 +44,6 @@ class Recipe(NamedTuple):
     behind: float = 4.0
     """Bits that an unknown voxel beside a free one promises, in multiples of its own, where far places are
     looked for."""
-
-
-_COUNTS = (
-    ("draw_thinning", 1, 1000),
-    *((name, 0, 100_000) for name in ("gazes", "turns", "places", "refinements", "far_places")),
-    *((name, 1, 100_000) for name in ("refined", "far_gazes", "waypoint_gazes")),
-)
-"""Fields of a Recipe that are counts, and their ranges."""
-
-
-def checked(recipe: Recipe) -> Recipe:
-    """Return a recipe with its numbers in the types for which kernels are compiled.
-
-    Raises:
-        SettingError: A field has a value that makes no sense.
-    """
-    check_positive(recipe, "exponent", "block_m")
-    check_not_negative(recipe, "far_below", "known_ground_share", "leave_below", "behind")
-    for name in ("stop_probability", "gap_probability"):
-        check(recipe, name, "a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
-    for name, least, most in _COUNTS:
-        check_count(recipe, name, least, most)
-    drawn = recipe.gazes + recipe.turns + recipe.places
-    check(recipe, "places", "above 0 where neither gazes nor turns are drawn", lambda _: drawn > 0)
-    counts = {name for name, _, _ in _COUNTS}
-    numbers = recipe._asdict().items()
-    return Recipe._make(int(value) if name in counts else float(value) for name, value in numbers)
 
 
 ALL_AROUND = Recipe(

@@ -90,7 +90,7 @@ VIEW = record_type(
         ("distance", "f8"),  # sum over those seen, voxel edges
         ("slivers", "i8"),  # unknown voxels left beside them, one voxel thick
         ("unique", "f8"),  # sum over those seen of 1/n, with n the candidates that see the voxel
-        ("shared", "f8", (3,)),  # most bits in announced views, the largest first
+        ("announced_bits", "f8"),  # those in the announced view that it shares most with
     ],
 )
 """What is expected to be seen from a candidate, or from the far place to which it leads."""
@@ -102,7 +102,6 @@ EXPERIENCE = record_type(
         ("decided_s", "f8"),  # when it last decided at a stop
         ("decided_bits", "f8"),  # what its own scans had brought by then
         ("exponent", "f8"),  # c of bits / s^c, now
-        ("best_rate", "f8"),  # most bits per second of a candidate
         ("going", "?"),  # whether it is on its way to a far place
         ("goal", "f8", (5,)),  # that far place
         ("far_value", "f8"),  # what the best far place was worth when they were last evaluated
@@ -112,13 +111,11 @@ EXPERIENCE = record_type(
         ("stood_at", "f8", (3,)),  # where it stopped last, but for steps of less than a voxel edge
         ("low_gain_scans", "i8"),  # in a row, taken there; once they are DEPLETED_SCANS, taken anywhere
         ("blocked", "i8"),  # decisions during which it keeps clear of teammates
-        ("was_free", "?"),  # whether it ever was where a path led anywhere
-        ("free_at", "f8", (3,)),  # where that was last
         ("edges", "i8"),  # drives that the end of the ground cut short
         ("edge_at", "f8", (REMEMBERED_EDGES, 3)),  # places just beyond it, the last of these drives
-        ("failures", "i8"),  # how many of these are in use
+        ("failures", "i8"),  # number of viewpoints that failed, of which the last are kept
         ("failed", "f8", (REMEMBERED, 5)),  # viewpoints that did not bring what was expected
-        ("share", "f8", (REMEMBERED,)),  # of the expected bits that came; 0 = it was not reached
+        ("share", "f8", (REMEMBERED,)),  # of the expected bits that came; 0 = not reached, 1 = forgotten
         ("forget_at", "f8", (REMEMBERED,)),  # distance from it at which it is forgotten
     ],
 )

@@ -19,6 +19,8 @@ from entropy_explore_env.planner.thresholds import (
 from entropy_explore_env.planner.views import clear_marks, look_from, mark_view
 
 _NEAR, _FAR = int(Kind.NEAR), int(Kind.FAR)
+_WHATEVER = 2.0
+"""Share of common voxels that no candidate exceeds."""
 
 
 @lean_kernel
@@ -28,14 +30,64 @@ def most_far_of(candidates):
 
 
 @lean_kernel
-def _is_alike(proposer, at, other):
-    """Return whether two viewpoints hardly differ."""
-    if distance_apart(at, other) >= ALIKE_REACH * proposer.within:
-        return False
-    if proposer.all_around:
-        return True
-    apart = ALIKE_WIDTH * proposer.view_width_rad
-    return turned(at[3], other[3]) * math.cos(at[4]) < apart and abs(at[4] - other[4]) < apart
+def select(proposer, situation, size, choice, kept):
+    """Select the candidates out of the pool: their numbers are left in `scratch.taken`, the choice first.
+
+    Far ones come next; then a quarter may be the best places within reach, and the rest is what is worth
+    most of all nearby. None sees much the same as another.
+
+    Args:
+        proposer: See `model`.
+        situation: See `model`.
+        size: Viewpoints in the pool.
+        choice: Number of the planner's own choice.
+        kept: Number of one that is taken in any case; -1 = none.
+
+    Returns:
+        How many candidates there are.
+    """
+    scratch = proposer.scratch
+    pool, order, most = scratch.pool, scratch.order, len(scratch.taken)
+    count, marked = _take(proposer, situation, choice, 0, 0, _WHATEVER)
+    places = most // NEAR_SHARE - int(pool[choice].kind == _NEAR)
+    if kept >= 0 and kept != choice and count < most:
+        count, marked = _take(proposer, situation, kept, count, marked, _WHATEVER)
+        places -= int(pool[kept].kind == _NEAR)
+    tries = 2 * most - count
+    for k in range(size):
+        order[k] = k
+    for place in range(size):
+        if count == most or tries == 0:
+            break
+        _bring_first(pool, order, place, size, places > 0)
+        number = order[place]
+        if pool[number].value > 0.0 and _is_other(proposer, number, count):
+            tries, before = tries - 1, count
+            count, marked = _take(proposer, situation, number, count, marked, MOST_COMMON)
+            places -= int(count > before and pool[number].kind == _NEAR)
+    clear_marks(proposer, marked)
+    return count
+
+
+@lean_kernel
+def _take(proposer, situation, number, count, marked, most_common):
+    """Make a viewpoint of the pool a candidate unless it sees much the same as one of `count` others.
+
+    Returns:
+        (count, marked): the candidates then, and the voxels in `scratch.seen`.
+    """
+    scratch, belief = proposer.scratch, situation.belief
+    option = scratch.pool[number]
+    if not look_from(proposer, situation, option.goal, count, most_common):
+        return count, marked
+    scratch.taken[count] = number
+    marked = mark_view(proposer, belief, count, marked)
+    if option.seconds < math.inf:  # put what all rays should bring in place of what fewer should
+        option.bits = worth_bits(proposer, situation, option.goal, scratch.views[count].bits)
+        option.value = value_of(situation, option.bits, option.seconds)
+        if option.kind != _FAR:
+            option.stop_bits = option.bits
+    return count + 1, marked
 
 
 @lean_kernel
@@ -53,59 +105,14 @@ def _is_other(proposer, number, count):
 
 
 @lean_kernel
-def select(proposer, situation, size, choice, kept):
-    """Select the candidates out of the pool: their numbers are left in `scratch.taken`, the choice first.
-
-    Far ones come next; then a quarter may be the best places within reach, and the rest is what is worth
-    most of all nearby. None sees much the same as another.
-
-    Args:
-        proposer: See `nearby`.
-        situation: See `nearby`.
-        size: Viewpoints in the pool.
-        choice: Number of the planner's own choice.
-        kept: Number of one that is taken in any case; -1 = none.
-
-    Returns:
-        How many candidates there are.
-    """
-    scratch, belief = proposer.scratch, situation.belief
-    pool, taken, order = scratch.pool, scratch.taken, scratch.order
-    most, count, marked = len(taken), 0, 0
-    tries, places = 2 * most, most // NEAR_SHARE
-    for k in range(size):
-        order[k] = k
-    for place in range(-2, size):
-        must = place < 0
-        number = choice if place == -2 else kept
-        if must and (number < 0 or (place == -1 and kept == choice)):
-            continue
-        if not must:
-            _bring_first(pool, order, place, size, places > 0)
-            number = order[place]
-            if pool[number].value <= 0.0 or not _is_other(proposer, number, count):
-                continue
-        if count == most or tries == 0:
-            break
-        tries -= 1
-        if look_from(proposer, situation, pool[number].goal, count, 2.0 if must else MOST_COMMON):
-            taken[count] = number
-            marked = mark_view(proposer, belief, count, marked)
-            _note_exactly(proposer, situation, pool[number], scratch.views[count].bits)
-            count += 1
-            places -= int(pool[number].kind == _NEAR)
-    clear_marks(proposer, marked)
-    return count
-
-
-@lean_kernel
-def _note_exactly(proposer, situation, option, bits):
-    """Put the bits that all rays should bring in place of those of fewer; not of what has no path."""
-    if option.seconds < math.inf:
-        option.bits = worth_bits(proposer, situation, option.goal, bits)
-        option.value = value_of(situation, option.bits, option.seconds)
-        if option.kind != _FAR:
-            option.stop_bits = option.bits
+def _is_alike(proposer, at, other):
+    """Return whether two viewpoints hardly differ."""
+    if distance_apart(at, other) >= ALIKE_REACH * proposer.within:
+        return False
+    if proposer.all_around:
+        return True
+    apart = ALIKE_WIDTH * proposer.view_width_rad
+    return turned(at[3], other[3]) * math.cos(at[4]) < apart and abs(at[4] - other[4]) < apart
 
 
 @lean_kernel

@@ -16,22 +16,17 @@ class PlannerState(enum.IntEnum):
     LEAVING = 1
     """What is left around it brings few bits a second: it goes by the plain rate, c = 1."""
     DEPLETED = 2
-    """Many scans in a row had a low gain: it goes by the plain rate, evaluates more far places, and takes
-    viewpoints for failures sooner."""
+    """Many scans in a row had a low gain: it goes by the plain rate, evaluates other far places each time
+    and takes viewpoints for failures sooner."""
     WANDERING = 3
     """Nothing is expected of any viewpoint, or a teammate is in the way: it goes to a random viewpoint."""
-    ENCLOSED = 4
-    """No path leads it away from where its body is, by its belief: it goes back towards where one did."""
 
 
-_EXPLORING, _LEAVING, _DEPLETED = (
-    int(state) for state in (PlannerState.EXPLORING, PlannerState.LEAVING, PlannerState.DEPLETED)
-)
-_WANDERING, _ENCLOSED = int(PlannerState.WANDERING), int(PlannerState.ENCLOSED)
+_EXPLORING, _LEAVING, _DEPLETED, _WANDERING = (int(state) for state in PlannerState)
 
 
 @lean_kernel
-def next_state(low_gain_scans, leaves, best_bits, encloses, gives_way):
+def next_state(low_gain_scans, leaves, best_bits, gives_way):
     """Return the PlannerState that follows from what a robot knows so far.
 
     It is asked after a scan, when nothing has been evaluated yet (`best_bits` is inf), and again for what the
@@ -41,11 +36,8 @@ def next_state(low_gain_scans, leaves, best_bits, encloses, gives_way):
         low_gain_scans: Scans in a row that had a low gain.
         leaves: Whether its last decision brought few bits a second.
         best_bits: Expected bits of the viewpoint that is worth most.
-        encloses: Whether no path leads it away and there is a way back.
         gives_way: Whether it makes room for a teammate.
     """
-    if encloses:
-        return _ENCLOSED
     if gives_way or best_bits <= NO_GAIN_BITS:
         return _WANDERING
     if low_gain_scans >= DEPLETED_SCANS:

@@ -30,8 +30,6 @@ FAR_DECISIONS, FAR_DECISIONS_STRAIGHT = 8, 4
 """Decisions on one spot until far places are evaluated again, with `far_below` of 1 and below it (tuned)."""
 TRIED_STOPS = 6
 """Far places whose first stop is examined, and gazes at stops that are proposed but not chosen (tuned)."""
-FURTHER_BATCHES = 8
-"""Batches of the next best far places that a robot evaluates where the first bring little (tuned)."""
 
 # Failures that a robot remembers
 DRIVE_TOLERANCE = 0.01
@@ -67,8 +65,6 @@ LEAST_WORTH = 0.01
 so that there is a best one)."""
 RANDOM_VIEWPOINTS = 16
 """Number of viewpoints that a WANDERING robot draws, of which it takes the most trusted one (tuned)."""
-ENCLOSED_MARGIN = 2
-"""Distance beyond its body from which on a robot that gets there is not ENCLOSED (by construction)."""
 
 # Selecting candidates out of the pool
 FAR_SHARE, NEAR_SHARE = 4, 4

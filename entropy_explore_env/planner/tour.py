@@ -1,28 +1,40 @@
-"""The strategy `tour`, in the manner of TARE (Cao et al. 2021): near viewpoints and far regions in a tour.
+"""Rules that go on short open tours: `tour`, and how `planned-rate` explores plans that are to be seen whole.
 
-Within a horizon of the robot, few frontier cells are chosen from which all frontier cells there can be seen
-close enough: in turn, the one that covers most that is not covered yet (greedy set cover, as there). Beyond
-the horizon, frontier cells are put together by coarse cells of the map; the nearest one stands for its
-coarse cell. The robot goes to the first place of a short open tour from where it is through all of these.
+`tour` is in the manner of TARE (Cao et al. 2021). Within a horizon of the robot, few frontier cells are
+chosen from which all frontier cells there can be seen close enough: in turn, the one that covers most that is
+not covered yet (greedy set cover, as there). Beyond the horizon, frontier cells are put together by coarse
+cells of the map; the nearest one stands for its coarse cell. The robot goes to the first place of a short
+open tour from where it is through all of these. The tour minimises the length of shortest paths between all
+of its places. (Lengths along the tree of paths from the robot make it a quarter longer.) TARE solves the two
+levels one after the other and takes the first solution of OR-Tools; here both are one tour, built by
+insertion and improved by 2-opt and Or-opt moves (`open_tours`). Ours: the place chosen last stays the first
+unless that makes the tour longer by more than a share.
 
-The tour minimises the length of shortest paths between all of its places. (Lengths along the tree of paths
-from the robot, which need no further searches, make it a quarter longer.) TARE solves the two levels one
-after the other and takes the first solution of OR-Tools; here both are one tour, built by insertion and
-improved by 2-opt and Or-opt moves (`open_tours`).
+`SharedTour` plans through the frontier cells that are nearer to the robot, by its paths, than to where
+teammates go, by the straight line; where there is none, through all of them. A tour does not leave behind
+what it would have to come back for: in plans it drives shorter paths than rules that choose one frontier cell
+at a time. A dead end is a frontier of few connected voxels: little lies behind it, and the robot need not
+drive to it. It drives to a place from which all that is unknown around the frontier cell is in sight, the one
+that makes the path over it to the tour's next place shortest, if that is shorter than over the cell. Where
+the look leaves the cell a frontier, the robot goes on to it. To an opening it drives at once, since what lies
+behind has to be explored from there.
 
-Ours: the place chosen last stays the first unless that makes the tour longer by more than a share.
-
-Tuned: `near` and `cover`, see docs/explorers.md.
+Tuned: `near`, `cover`, `opening` and `view`, see docs/explorers.md.
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.open_tours import open_tour, tour_length
 from entropy_explore_env.planner.frontier_rule import FrontierRule
-from entropy_explore_env.planner.scene import Goal, Scene
+from entropy_explore_env.planner.scene import NOWHERE, Goal, Scene, scanned_here
+
+_SHORTER = 1e-6
+"""A way is shorter if it is so by this many voxel edges."""
 
 
 class Tour(FrontierRule):
@@ -48,13 +60,7 @@ class Tour(FrontierRule):
         return int(places[0]) if len(places) else NONE
 
     def tour_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-        """(N,) int32 places in the order of a tour through what frontier cells stand for.
-
-        Args:
-            scene: What the robot knows.
-            voxels: (K,) int32, the cells.
-            lengths: (K,) of the paths to them, in voxel edges.
-        """
+        """Return (N,) int32 places in the order of a tour through what (K,) frontier cells stand for."""
         if len(voxels) <= 1:
             return voxels
         order = np.argsort(lengths, kind="stable")
@@ -68,11 +74,10 @@ class Tour(FrontierRule):
         return places[self._ordered(between, np.flatnonzero(places == scene.target)) - 1]
 
     def _ordered(self, between: np.ndarray, target: np.ndarray) -> np.ndarray:
-        """(N,) int64 places 1 to N of a short tour from place 0, which begins with a target if hardly longer.
+        """Return (N,) int64 places 1 to N of a short tour from place 0 with (1 + N, 1 + N) lengths of paths.
 
-        Args:
-            between: (1 + N, 1 + N) lengths of the paths.
-            target: (1,) or (0,), the place that was chosen last, less one.
+        It begins with the `target`, (1,) the place that was chosen last, less one, or (0,), if that makes it
+        hardly longer.
         """
         tour = open_tour(between)
         if len(target) == 0:
@@ -84,7 +89,7 @@ class Tour(FrontierRule):
         return onward if length <= (1.0 + self.stay) * tour_length(between, tour) else tour[1:]
 
     def _cover(self, scene: Scene, voxels: np.ndarray) -> list[int]:
-        """Which near frontier cells cover all of them: the target, then of equally good ones the nearest."""
+        """Return which near frontier cells cover all: the target, then of equally good ones the nearest."""
         if len(voxels) == 0:
             return []
         seen = scene.paths.free_lines(scene.centres(voxels), self.cover * scene.cells.reach)
@@ -99,7 +104,7 @@ class Tour(FrontierRule):
         return chosen
 
     def _coarse(self, scene: Scene, voxels: np.ndarray) -> np.ndarray:
-        """Of the far frontier cells, in order of distance, the first of each coarse cell; the target, too."""
+        """Return the nearest far frontier cell of each coarse cell, in order of distance, and the target."""
         edge = max(self.coarse * scene.cells.reach, 1.0)
         cells = np.floor(scene.centres(voxels) / edge).astype(np.int64)
         if len(cells) == 0:
@@ -109,3 +114,52 @@ class Tour(FrontierRule):
         target = np.flatnonzero(voxels == scene.target)
         first[of_cell[target]] = target
         return np.sort(first)[: self.most_far]
+
+
+class SharedTour(Tour):
+    """Goes on a tour through what teammates leave to the robot, and looks into dead ends from outside."""
+
+    rule = "planned-rate"
+    opening = 0.125
+    """A frontier is a dead end if it has fewer connected known free voxels; over the sensor's range."""
+    view = 0.5
+    """Largest distance from which a dead end is looked at, in sensor ranges."""
+    around = 3
+    """Distance in voxels, along each axis, from what the body touches in the frontier cell, within which all
+    unknown voxels of the frontier have to be visible."""
+
+    def pick(self, scene: Scene) -> Goal:
+        """Return the voxel to go to; see `FrontierRule`."""
+        tour = self.tour_among(scene, *scene.paths.all_frontiers(scene.here))
+        if len(tour) == 0:
+            return NOWHERE
+        target = int(tour[0])
+        if target == scene.looked:
+            return Goal(target, target, looked=True)
+        return self._first_leg(scene, target, tour[1:2])
+
+    def tour_among(self, scene: Scene, voxels: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+        """See `Tour`."""
+        own = scene.nearer_than_teammates(voxels, lengths)
+        return super().tour_among(scene, voxels[own], lengths[own])
+
+    def _first_leg(self, scene: Scene, target: int, onward: np.ndarray) -> Goal:
+        """Return the tour's first place, or a place from which it is looked at, as a Goal.
+
+        `onward` is (1,) the second place of the tour; (0,) if the tour has only one.
+        """
+        cells, few = scene.cells, math.ceil(self.opening * scene.cells.reach)
+        if cells.opening(target, few) >= few:
+            return Goal(target, target)
+        sight = self.view * cells.reach
+        unseen = cells.unseen_around(target, self.around)
+        if cells.first_viewing_place(np.array([scene.here], np.int32), unseen, sight) != NONE:
+            return Goal(target, target, looked=True) if scanned_here(scene.view) else Goal(target, scene.here)
+        places = np.append(cells.standing_around(target, sight), np.int32(target))
+        lengths = scene.paths.lengths_from(scene.here, places)
+        for place in onward:
+            lengths = lengths + scene.paths.lengths_from(int(place), places)
+        order = np.argsort(lengths, kind="stable")
+        shorter = places[order[lengths[order] < lengths[-1] - _SHORTER]]
+        first = cells.first_viewing_place(shorter, unseen, sight)
+        return Goal(target, target if first == NONE else int(shorter[first]))

@@ -10,7 +10,7 @@ from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.visibility import in_cone
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.planner.candidate_features import ANNOUNCED, SEEN_BITS
+from entropy_explore_env.planner.candidate_features import SEEN_BITS
 from entropy_explore_env.viewpoints.expected_scan import imagine_scan
 
 _SEEN_RATIO = 2.0 ** (2.0 * SEEN_BITS) - 1.0
@@ -22,17 +22,11 @@ _ONE = np.uint64(1)
 
 @lean_kernel
 def look_from(proposer, situation, at, number, most_common):
-    """Find out what a scan from a viewpoint should see, and how much of that other candidates see.
-
-    Args:
-        proposer: See `nearby`; candidates with lower numbers have been looked from.
-        situation: See `nearby`.
-        at: (5,) the viewpoint, grid units.
-        number: Of the candidate; `scratch.views` and `scratch.common` of it are filled in.
-        most_common: Largest share of the voxels of either that one before and it may both see.
+    """Find out what a scan from a viewpoint (5,) should see, VIEW `number`, and compare it with those before.
 
     Returns:
-        Whether it sees something other than each candidate before.
+        Whether it sees something other than each of them: no more than the share `most_common` of the
+        voxels of either in common.
     """
     scratch = proposer.scratch
     touched = imagine_scan(situation.belief, proposer.exact, at, scratch.scan)
@@ -95,34 +89,17 @@ def _gather(proposer, situation, at, touched, view):
     view.all_bits = 0.5 * (all_bits + math.log2(all_growth))
     view.again_bits = 0.5 * (again_bits + math.log2(again_growth))
     view.seen, view.unknown, view.distance = seen, unknown, distance
-    view.slivers, view.unique = 0, 0.0
-    _sort_shared(cone_bits, len(cones), view.shared)
-
-
-@lean_kernel
-def _sort_shared(cone_bits, count, shared):
-    """Write down the largest of some numbers, the largest first; 0 where there are fewer."""
-    for place in range(ANNOUNCED):
-        shared[place] = 0.0
-    for mate in range(count):
-        bits = cone_bits[mate]
-        for place in range(ANNOUNCED):
-            if bits > shared[place]:
-                bits, shared[place] = shared[place], bits
+    view.slivers, view.unique, view.announced_bits = 0, 0.0, 0.0
+    for mate in range(len(cones)):
+        view.announced_bits = max(view.announced_bits, cone_bits[mate])
 
 
 @lean_kernel
 def mark_view(proposer, belief, number, marked):
     """Mark the voxels that a candidate sees, as `look_from` left them, and count slivers beside them.
 
-    Args:
-        proposer: See `nearby`.
-        belief: A Belief.
-        number: Of the candidate.
-        marked: How many voxels are in `scratch.seen`.
-
     Returns:
-        How many are there now.
+        How many voxels are in `scratch.seen` then; there were `marked`.
     """
     scratch, bit = proposer.scratch, _ONE << np.uint64(number)
     marks, touched, view = scratch.marks, scratch.scan.touched, scratch.views[number]

@@ -115,8 +115,8 @@ FIELDS_CANDIDATES = ("viewpoint", "goal", "bits", "kind")
 """Fields of `candidates`, where actions are candidates."""
 
 FIELDS_EXPERIENCE = (
-    "candidates_rng most_bits best_rate going goal far_value looked_far far_at patience blocked was_free "
-    "free_at failures failed share forget_at".split()
+    "candidates_rng most_bits going goal far_value looked_far far_at patience blocked failures "
+    "failed share forget_at".split()
 )
 """Fields of `experience`, likewise; without those that follow from times and bits: `decided_s`,
 `decided_bits`, `exponent`."""

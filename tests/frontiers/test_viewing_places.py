@@ -16,8 +16,7 @@ from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
 from entropy_explore_env.frontiers.voxel_map import is_visible
 from entropy_explore_env.planner.scene import Goal
-from entropy_explore_env.planner.shared_tour import SharedTour
-from entropy_explore_env.planner.tour import Tour
+from entropy_explore_env.planner.tour import SharedTour, Tour
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.robots.motion import MoveEnd
 from tests.planner.scenes import (

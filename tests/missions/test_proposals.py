@@ -14,7 +14,7 @@ from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.missions.view_observation import ViewObserver
-from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
+from entropy_explore_env.planner.candidate_features import COLUMNS, CONTEXT, FEATURES
 from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.randomness import Stream, splitmix_states
 from entropy_explore_env.reports.state_values import state_digest
@@ -85,7 +85,7 @@ SPOILED = [
     ("candidates", "goal", 13.0),
     ("candidates", "kind", 4),
     ("candidates", "bits", -1.0),
-    ("experience", "failures", 17),
+    ("experience", "failures", -1),
     ("experience", "goal", -13.0),
     ("experience", "failed", math.inf),
     ("experience", "share", 1.5),
@@ -183,8 +183,8 @@ def test_who_drives_on_has_the_viewpoint_to_which_it_drives_among_its_candidates
             apart = np.abs(view.candidates - view.target).max(axis=1)
             number = int(np.argmin(apart))
             assert apart[number] < 1e-6
-            kept = missions.layout.split(missions.observations[0, robot])["candidates"][number, 5]
-            assert kept == 1.0
+            kept = missions.layout.split(missions.observations[0, robot])["candidates"][number]
+            assert kept[COLUMNS["kept"]] == 1.0
             under_way += 1
         missions.step(np.zeros((1, 2, 1)), rng.integers(0, MOST, (1, 2)))
     assert under_way > 3

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from baselines.experiments.mission import run_mission, scripted
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.explorer import PlannedRate, explores_frontiers
-from entropy_explore_env.planner.shared_tour import SharedTour
-from entropy_explore_env.planner.tour import Tour
+from entropy_explore_env.planner.tour import SharedTour, Tour
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import OFFICE, find_scenario

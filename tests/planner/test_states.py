@@ -9,15 +9,14 @@ from entropy_explore_env.planner.thresholds import DEPLETED_SCANS
 
 
 @pytest.mark.parametrize(
-    ("low_gain_scans", "leaves", "best_bits", "encloses", "gives_way", "state"),
+    ("low_gain_scans", "leaves", "best_bits", "gives_way", "state"),
     [
-        (0, False, math.inf, False, False, PlannerState.EXPLORING),
-        (DEPLETED_SCANS - 1, True, 1.0, False, False, PlannerState.LEAVING),
-        (DEPLETED_SCANS, True, 1.0, False, False, PlannerState.DEPLETED),
-        (DEPLETED_SCANS, True, 1e-6, False, False, PlannerState.WANDERING),
-        (0, False, 1.0, False, True, PlannerState.WANDERING),
-        (DEPLETED_SCANS, True, 0.0, True, False, PlannerState.ENCLOSED),
+        (0, False, math.inf, False, PlannerState.EXPLORING),
+        (DEPLETED_SCANS - 1, True, 1.0, False, PlannerState.LEAVING),
+        (DEPLETED_SCANS, True, 1.0, False, PlannerState.DEPLETED),
+        (DEPLETED_SCANS, True, 1e-6, False, PlannerState.WANDERING),
+        (0, False, 1.0, True, PlannerState.WANDERING),
     ],
 )
-def test_what_is_most_urgent_decides(low_gain_scans, leaves, best_bits, encloses, gives_way, state):
-    assert next_state(low_gain_scans, leaves, best_bits, encloses, gives_way) == state
+def test_what_is_most_urgent_decides(low_gain_scans, leaves, best_bits, gives_way, state):
+    assert next_state(low_gain_scans, leaves, best_bits, gives_way) == state

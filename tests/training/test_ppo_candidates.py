@@ -128,7 +128,7 @@ def test_weights_of_other_networks_are_refused(trained, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("changes", "named"),
     [
-        ({"features_version": FEATURES_VERSION + 1}, "features_version = 2: allowed is 1: its features"),
+        ({"features_version": FEATURES_VERSION + 1}, "features_version = 3: allowed is 2: its features"),
         ({"features_version": None}, "features_version = None"),
         ({"candidate_features": ["score", "beauty"]}, "candidate_features = 'beauty'"),
         ({"candidate_features": list(COLUMNS)}, "candidate_features = 'context: entropy'"),

@@ -66,7 +66,7 @@ class Run:
     """Runs a mission of a cell.
 
     Attributes:
-        guarded: Whether a robot that drifts backs off from what blocks it: see `planner.back_off`.
+        guarded: Whether a robot that drifts backs off from what blocks it: see `planner.driver`.
     """
 
     guarded: bool = True

@@ -59,7 +59,7 @@ GROUPS = {
 class Run:
     """Runs a mission of a cell with `next-best-view`, whatever the strategy that the cell names.
 
-    Without what lets robots that drift back off from what blocks them (`planner.back_off`): the paper's
+    Without what lets robots that drift back off from what blocks them (`planner.driver`): the paper's
     have nothing of the kind.
     """
 
