@@ -181,12 +181,6 @@ def announced_cone(grid: Grid, mate: TeammateKnowledge) -> np.void:
     return cones[0]
 
 
-def announced_cones(view: RobotKnowledge) -> np.ndarray:
-    """Return (M,) CONE of what teammates have announced to see, in grid units."""
-    heard = [mate for mate in view.teammates.values() if mate.announced_s >= 0.0 and mate.depth_m > 0.0]
-    return np.array([announced_cone(view.scenario.grid, mate) for mate in heard], CONE)
-
-
 def random_viewpoint(view: RobotKnowledge, rng: np.random.Generator) -> np.ndarray:
     """Return a viewpoint (5,) drawn uniformly within a robot's reach, the gaze in any direction."""
     grid, reach_m, axes = view.scenario.grid, view.kind.robot.reach_m, 2 if view.planar else 3

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, Lattice, new_lattice
 from entropy_explore_env.belief.paths.search import cost_to
 from entropy_explore_env.belief.raycast import (
@@ -20,6 +19,7 @@ from entropy_explore_env.belief.raycast import (
     Line,
     cast_ray,
     longest_crossing,
+    point,
 )
 from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
@@ -118,62 +118,47 @@ def new_scratch(grid: Grid, models: Sequence[RobotModel]) -> ScanScratch:
 
 
 @lean_kernel
-def line_is_free(belief, start, direction, length, body_radius, scratch):
+def line_is_free(belief, start, finish, body_radius, scratch):
     """Return whether a ball-shaped body meets nothing believed covered on a straight line, and no boundary.
 
     Tested along the line of its centre and, for bodies larger than half a voxel, of four points at its sides.
 
     Args:
         belief: A Belief.
-        start: (x, y, z) in grid units.
-        direction: (x, y, z), unit vector.
-        length: Of the line, voxel edges.
+        start: (3,) or more numbers, x, y, z in grid units.
+        finish: The same of the line's other end.
         body_radius: Voxel edges.
         scratch: A ScanScratch.
     """
-    size = belief.size
-    x, y, z = direction
+    size, begin = belief.size, point(start)
+    x, y, z = finish[0] - begin[0], finish[1] - begin[1], finish[2] - begin[2]
+    length = math.sqrt(x * x + y * y + z * z)
+    if length <= 1e-9:
+        return True
+    x, y, z = x / length, y / length, z / length
     level = math.sqrt(x * x + y * y)
     side = (-y / level, x / level, 0.0) if level > 1e-9 else (1.0, 0.0, 0.0)
     over = (y * side[2] - z * side[1], z * side[0] - x * side[2], x * side[1] - y * side[0])
     wide = body_radius > 0.5 + 1e-9
-    for point in range(5 if wide else 1):
-        by_side = body_radius * (1.0 if point == 1 else -1.0 if point == 2 else 0.0)
-        by_over = body_radius * (1.0 if point == 3 else -1.0 if point == 4 else 0.0)
-        if point > 2 and size[2] == 1:
+    for number in range(5 if wide else 1):
+        by_side = body_radius * (1.0 if number == 1 else -1.0 if number == 2 else 0.0)
+        by_over = body_radius * (1.0 if number == 3 else -1.0 if number == 4 else 0.0)
+        if number > 2 and size[2] == 1:
             continue
-        begin = (
-            start[0] + by_side * side[0] + by_over * over[0],
-            start[1] + by_side * side[1] + by_over * over[1],
-            start[2] + by_side * side[2] + by_over * over[2],
+        beside = (
+            begin[0] + by_side * side[0] + by_over * over[0],
+            begin[1] + by_side * side[1] + by_over * over[1],
+            begin[2] + by_side * side[2] + by_over * over[2],
         )
         for axis in range(3):
-            if not 0.0 <= begin[axis] <= size[axis]:
+            if not 0.0 <= beside[axis] <= size[axis]:
                 return False
-        reach = length + (body_radius if wide and point == 0 else 0.0)
-        _, _, end = cast_ray(
-            belief.mean,
-            size,
-            Line(begin, direction, reach),
-            STOP_AT_COVERED,
-            OPEN_END,
-            NONE_BEHIND,
-            Crossing(scratch.crossed, scratch.entered),
-        )
+        line = Line(beside, (x, y, z), length + (body_radius if wide and number == 0 else 0.0))
+        crossing = Crossing(scratch.crossed, scratch.entered)
+        _, _, end = cast_ray(belief.mean, size, line, STOP_AT_COVERED, OPEN_END, NONE_BEHIND, crossing)
         if end != OPEN:
             return False
     return True
-
-
-def is_line_free(
-    belief: Belief, start: np.ndarray, extent: np.ndarray, body_radius: float, scratch: ScanScratch
-) -> bool:
-    """Return whether the line from a place (3,) along an extent (3,), grid units, is free by the belief."""
-    length = float(np.linalg.norm(extent))
-    if length < 1e-9:
-        return True
-    x, y, z = (extent / length).tolist()
-    return bool(line_is_free(belief, start, (x, y, z), length, body_radius, scratch))
 
 
 @inlined_kernel
@@ -191,12 +176,9 @@ def straight_seconds(belief, voxel_size_m, drive, here, at, scratch):
 
     It is inf where the line is not free by the belief; `scratch` is a ScanScratch.
     """
-    x, y, z = at[0] - here[0], at[1] - here[1], at[2] - here[2]
-    length = math.sqrt(x * x + y * y + z * z)
-    if length > 1e-9:
-        direction = (x / length, y / length, z / length)
-        if not line_is_free(belief, here, direction, length, drive.body_radius, scratch):
-            return math.inf
+    if not line_is_free(belief, here, at, drive.body_radius, scratch):
+        return math.inf
+    length = math.sqrt((at[0] - here[0]) ** 2 + (at[1] - here[1]) ** 2 + (at[2] - here[2]) ** 2)
     return _seconds(drive, length * voxel_size_m, 1, here, at)
 
 

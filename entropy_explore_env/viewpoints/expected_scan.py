@@ -26,7 +26,6 @@ import numpy as np
 
 from entropy_explore_env.belief.measurement_model import measurement_precision
 from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
-from entropy_explore_env.belief.visibility import mark_cones
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
@@ -203,7 +202,10 @@ def imagine_scan(belief, scan, at, scratch):
 
 @lean_kernel
 def expected_bits(belief, scan, at, scratch):
-    """Return the bits that a scan from a viewpoint (5,) should bring; `scratch.left` is marked before."""
+    """Return the bits that a scan from a viewpoint should bring; arguments as of `imagine_scan`.
+
+    Voxels that are left to teammates are marked in `scratch.left` before: see `belief.visibility.mark_cones`.
+    """
     count = imagine_scan(belief, scan, at, scratch)
     bits, growth = 0.0, 1.0
     for i in range(count):
@@ -215,21 +217,3 @@ def expected_bits(belief, scan, at, scratch):
             bits += math.log2(growth)
             growth = 1.0
     return 0.5 * (bits + math.log2(growth))
-
-
-@lean_kernel
-def fill_expected_bits(belief, scan, viewpoints, cones, scratch, bits):
-    """Fill in (K,) bits that a scan from each viewpoint (K, 5) should bring.
-
-    Args:
-        belief: A Belief.
-        scan: A ScanModel.
-        viewpoints: (K, 5) x, y, z, yaw, pitch.
-        cones: (M,) CONE; voxels whose centres lie in one are left to teammates.
-        scratch: A ScanScratch.
-        bits: (K,) float64, filled in.
-    """
-    mark_cones(cones, belief.size, scratch.left, 1)
-    for k in range(len(viewpoints)):
-        bits[k] = expected_bits(belief, scan, viewpoints[k], scratch)
-    mark_cones(cones, belief.size, scratch.left, 0)

@@ -24,8 +24,8 @@ from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.settings import Grid, RangeSensor
-from entropy_explore_env.viewpoints.evaluation import is_line_free, new_scratch, robot_model
-from entropy_explore_env.viewpoints.expected_scan import fill_expected_bits
+from entropy_explore_env.viewpoints.evaluation import line_is_free, new_scratch, robot_model
+from entropy_explore_env.viewpoints.expected_scan import expected_bits
 from tests.reference.scenes import drawn, free_box, put, random_belief, seeds, started
 
 SIZE, MOST = (7, 11, 5), 6
@@ -84,12 +84,11 @@ def test_where_a_mission_ends_by_what_is_seen_known_voxels_bring_nothing():
         proposer = new_proposers(scenario, recipe)[0]
         precision, situation = unknown_world()
         precision[:4, 5, 2] = 100.0
-        viewpoint, found = ALONG_X[None], np.zeros(1)
         scan = proposer.exact
-        fill_expected_bits(situation.belief, scan, viewpoint, situation.cones, proposer.scratch.scan, found)
         sensor = scenario.sensor
         gain = (sensor.sigma_min + sensor.sigma_slope_per_m * 3.25) ** -2
-        bits[scenario.ending.by_seen] = found[0]
+        found = expected_bits(situation.belief, scan, ALONG_X, proposer.scratch.scan)
+        bits[scenario.ending.by_seen] = found
         assert math.isinf(scan.wanted_precision) != scenario.ending.by_seen
     unknown, known = 0.5 * math.log2(1.0 + gain / PRIOR), 0.5 * math.log2(1.0 + gain / 100.0)
     assert bits[True] == pytest.approx(3 * unknown, rel=1e-5)
@@ -107,12 +106,9 @@ def test_there_a_scan_failed_if_what_it_was_to_show_is_still_unknown(known, fail
         last = knowledge(ALONG_X, 1e6 if part else 0.0)
         propose(proposer, situation._replace(knowledge=last), candidates, False)
         assert situation.experience["failures"] == (failures if part else 0)
-        scan, found = proposer.exact, np.zeros(1)
-        fill_expected_bits(
-            situation.belief, scan, ALONG_X[None], situation.cones, proposer.scratch.scan, found
-        )
+        found = expected_bits(situation.belief, proposer.exact, ALONG_X, proposer.scratch.scan)
         candidates[0]["viewpoint"] = ALONG_X
-        candidates[0]["kind"], candidates[0]["bits"] = Kind.SPOT, found[0]
+        candidates[0]["kind"], candidates[0]["bits"] = Kind.SPOT, found
         if known:
             precision[:] = 100.0
 
@@ -411,4 +407,4 @@ def test_candidates_in_any_belief_can_be_reached_as_they_claim(seed):
                 assert math.isfinite(shortest_path(new_search(mean.size), lattice, costs, *ends)[0])
             else:
                 radius = missions.scenario.robot.body_radius_m / 0.5
-                assert is_line_free(belief, here, at - here, radius, new_scratch(BOX.grid, [model]))
+                assert line_is_free(belief, here, at, radius, new_scratch(BOX.grid, [model]))

@@ -15,7 +15,7 @@ from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.settings import RangeSensor
 from entropy_explore_env.viewpoints.evaluation import (
     DriveModel,
-    is_line_free,
+    line_is_free,
     new_scratch,
     robot_model,
     sees_all_around,
@@ -31,8 +31,8 @@ DRIVE = DriveModel(1.0, 1.0, math.pi / 2, 0.5, 0.0)
 
 def line_free(mean, start, finish, radius):
     belief = Belief(mean.ravel(), mean.ravel(), SIZE)
-    extent = np.asarray(finish, float) - start
-    return is_line_free(belief, np.asarray(start, float), extent, radius, new_scan_scratch(1, 60, 1))
+    ends = np.array([start, finish], float)
+    return line_is_free(belief, ends[0], ends[1], radius, new_scan_scratch(1, 60, 1))
 
 
 def test_lines_leave_room_for_the_body():

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.map_update import fuse_scan
 from entropy_explore_env.belief.raycast import longest_crossing
-from entropy_explore_env.belief.visibility import CONE, cone_of
+from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cones
 from entropy_explore_env.robots.range_sensor import Scene, SensorPose, new_scan, sensor_model, take_scan
 from entropy_explore_env.scenarios import BOX
 from entropy_explore_env.settings import Grid, RangeSensor
@@ -20,7 +20,6 @@ from entropy_explore_env.viewpoints.evaluation import new_scratch, robot_model
 from entropy_explore_env.viewpoints.expected_scan import (
     ScanModel,
     expected_bits,
-    fill_expected_bits,
     new_scan_scratch,
 )
 from tests.reference.scenes import (
@@ -60,10 +59,10 @@ def expected(mean, precision, viewpoint, scan, cones=NO_CONES):
         mean.size, longest_crossing(*SIZE, math.inf, scan.voxels_behind), len(scan.pitches)
     )
     belief = Belief(mean.ravel(), precision.ravel(), SIZE)
-    viewpoints, bits = np.array([viewpoint], float), np.full(1, np.nan)
-    fill_expected_bits(belief, scan, viewpoints, cones, scratch, bits)
-    assert not scratch.added.any() and not scratch.left.any()
-    return bits[0]
+    mark_cones(cones, SIZE, scratch.left, 1)
+    bits = expected_bits(belief, scan, np.array(viewpoint, float), scratch)
+    assert not scratch.added.any()
+    return bits
 
 
 @drawn(40)
@@ -171,10 +170,8 @@ def one_ray(size):
 
 
 def imagined(belief, viewpoints, gap, model, size):
-    scratch, bits = new_scratch(Grid(size, 0.5), [model]), np.full(len(viewpoints), np.nan)
-    scan = model.scan._replace(gap_probability=gap)
-    fill_expected_bits(belief, scan, viewpoints, NO_CONES, scratch, bits)
-    return bits
+    scratch, scan = new_scratch(Grid(size, 0.5), [model]), model.scan._replace(gap_probability=gap)
+    return [expected_bits(belief, scan, viewpoint, scratch) for viewpoint in viewpoints]
 
 
 @pytest.mark.parametrize(("mean", "beyond"), [(0.0, 1.0), (0.1, 0.8), (0.5, 0.0)])

@@ -14,7 +14,6 @@ from scipy import ndimage
 from entropy_explore_env.belief.entropy import LN2, fill_occupancy_entropy
 from entropy_explore_env.belief.paths.geodesic_cells import extract_path, new_tessellation, tessellate
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
-from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.frontiers.knowledge import (
     RobotKnowledge,
@@ -25,12 +24,12 @@ from entropy_explore_env.frontiers.knowledge import (
 from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import (
     RobotModel,
-    is_line_free,
+    line_is_free,
     new_scratch,
     robot_model,
     sees_all_around,
 )
-from entropy_explore_env.viewpoints.expected_scan import fill_expected_bits
+from entropy_explore_env.viewpoints.expected_scan import expected_bits
 
 _GAZES = 16
 _PITCHES = (-0.6, 0.0, 0.6)
@@ -124,9 +123,9 @@ class Territory:
 
     def _line_is_free(self, view: RobotKnowledge, place: np.ndarray) -> bool:
         """Return whether the straight line to a place (3,), map frame, is free by the belief."""
-        extent = (place - view.pose[:3]) / view.scenario.grid.voxel_size_m
-        start, radius = view.scenario.grid.in_grid_units(view.pose), self._model_of(view).drive.body_radius
-        return is_line_free(belief_of(view), start, extent, radius, self._scratch)
+        grid, radius = view.scenario.grid, self._model_of(view).drive.body_radius
+        start, finish = (grid.in_grid_units(np.append(end[:3], (0.0, 0.0))) for end in (view.pose, place))
+        return bool(line_is_free(belief_of(view), start, finish, radius, self._scratch))
 
     def _gazing(self, view: RobotKnowledge, viewpoint: np.ndarray) -> np.ndarray:
         """Return the viewpoint with the gaze from which most bits are expected."""
@@ -138,8 +137,8 @@ class Territory:
         gazes = np.stack(np.meshgrid(yaws, pitches, indexing="ij"), axis=-1).reshape(-1, 2)
         drawn = np.tile(grid.in_grid_units(viewpoint), (len(gazes), 1))
         drawn[:, 3:] = gazes
-        bits, no_cones = np.empty(len(drawn)), np.zeros(0, CONE)
-        fill_expected_bits(belief_of(view), model.scan, drawn, no_cones, self._scratch, bits)
+        belief = belief_of(view)
+        bits = [expected_bits(belief, model.scan, at, self._scratch) for at in drawn]
         viewpoint[3:] = gazes[int(np.argmax(bits))]
         return viewpoint
 
