@@ -188,10 +188,7 @@ def _from_middle(low, high, x, y, z):
 def _nearest_to_middle(blocks, block, cost):
     """Return the CANDIDATE cell nearest to the middle of its block to which a path leads; NONE = none.
 
-    Args:
-        blocks: The blocks.
-        block: One of them.
-        cost: (N,) float64 path costs, inf = no path; (0,) = paths do not matter.
+    (N,) float64 path costs are inf where no path leads; with (0,) paths do not matter.
     """
     low, high = block_span(blocks, block)
     best, nearest = NONE, math.inf

@@ -118,7 +118,7 @@ class FrontierMap(ABC):
         self.changed, self._sigma = 0, math.nan
 
     def _start(self, points: int) -> None:
-        """Prepare counts of so many points, once states, blocks, costs and candidates are there."""
+        """Prepare counts of points, once states, blocks, costs and candidates are there."""
         self._counter = new_counter(points, self._size)
         self._bounds = np.full(len(self._voxels), np.inf)
         """(S,) float64, upper bounds of the candidates' V·(height factor); inf = unknown."""

@@ -6,7 +6,7 @@ ray from the place meets its top: along every direction the steepest slope to th
 horizon. Grid units: heights are in layers.
 
 In all functions `terrain` is the TerrainMap, `model` a ViewModel, `eye` a place (x, y, z) and `average` z_av
-there.
+there; `counter` and `marking` are as in `visibility`.
 """
 
 from __future__ import annotations
@@ -64,17 +64,7 @@ def height_at(terrain, x, y, eye, average, fade):
 
 @lean_kernel
 def count_below(counter, terrain, eye, average, azimuths, model, marking):
-    """Count the unexplored columns that are seen from a place; see `visibility`.
-
-    Args:
-        counter: A VisibilityCounter.
-        terrain: See the top of the file.
-        eye: See there.
-        average: See there.
-        azimuths: (D, 2) float64 unit vectors.
-        model: See there.
-        marking: Whether one more robot promises to see these columns.
-    """
+    """Count the unexplored columns that are seen from a place along (D, 2) float64 unit vectors."""
     number, points, weighed = start_count(counter), 0, 0.0
     size, reach = terrain.size, model.reach
     for direction in azimuths:
@@ -161,14 +151,10 @@ def half_widths(reach: float) -> np.ndarray:
 
 @lean_kernel
 def count_in_range(terrain, sums, widths, voxels, found):
-    """Fill in (K,) how many unexplored columns are in range of K voxels: no more can be seen from there.
+    """Fill in (K,) how many unexplored columns are in range of (K,) int32 voxels: no more is seen from there.
 
-    Args:
-        terrain: See the top of the file.
-        sums: (X, Y + 1) int32, the unexplored columns of each row along y before a column.
-        widths: (W,) of `half_widths`, for the sensor's reach.
-        voxels: (K,) int32.
-        found: (K,) filled in.
+    `sums` are (X, Y + 1) int32, the unexplored columns of each row along y before a column; `widths` those of
+    `half_widths` for the sensor's reach.
     """
     size, last = terrain.size, len(widths) - 1
     for place in range(len(voxels)):

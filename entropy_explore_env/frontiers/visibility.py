@@ -7,8 +7,8 @@ weight for the first promise.) The naive V, for comparison, counts all unexplore
 radius is the range.
 
 Counts are pairs: the number of points, and the sum of their weights. Grid units. In all functions `counter`
-is a VisibilityCounter, `state` the (V,) uint8 states of voxels, `size` the voxels along each axis, and
-`marking` whether one more robot promises to see the points.
+is a VisibilityCounter, `state` the (V,) uint8 states of voxels, `size` the voxels along each axis, `tree` a
+RayTree, and `marking` whether one more robot promises to see the points.
 """
 
 from __future__ import annotations
@@ -79,16 +79,9 @@ def count_point(counter, point, marking):
 
 @lean_kernel
 def count_crossed(counter, state, size, start, directions, reach, marking):
-    """Count the unexplored voxels that rays from a place cross.
+    """Count the unexplored voxels that rays from a place (x, y, z) cross.
 
-    Args:
-        counter: See the top of the file.
-        state: See there.
-        size: See there.
-        start: (x, y, z), the place.
-        directions: (D, 3) float64 unit vectors.
-        reach: Of the rays, in voxel edges; inf allowed.
-        marking: See the top of the file.
+    The rays go along (D, 3) float64 unit vectors, up to `reach` voxel edges far; inf allowed.
     """
     number, points, weighed = start_count(counter), 0, 0.0
     for ray in range(len(directions)):
@@ -121,16 +114,9 @@ def count_in_ball(counter, state, size, start, reach, marking):
 
 @lean_kernel
 def count_from(counter, state, size, voxels, tree, seen, weighed):
-    """Count from the centres of K voxels what `count_crossed` finds there, with the rays as a tree.
+    """Count from the centres of (K,) int32 voxels what `count_crossed` finds there, with the rays as a tree.
 
-    Args:
-        counter: See the top of the file.
-        state: See there.
-        size: See there.
-        voxels: (K,) int32.
-        tree: The RayTree.
-        seen: (K,) filled in with the numbers of points.
-        weighed: (K,) filled in with the sums of weights.
+    (K,) `seen` and `weighed` are filled in with the numbers of points and the sums of weights.
     """
     for place in range(len(voxels)):
         at, inside = grid_index(size, voxels[place]), True
@@ -166,14 +152,10 @@ def _count_branches(counter, state, size, tree, at, number, inside):
 
 @lean_kernel
 def raise_bounds(size, opened, voxels, tree, bounds):
-    """Add to upper bounds of what is seen from K voxels what may become visible past newly freed voxels.
+    """Raise upper bounds of what is seen from voxels by what may become visible past (N,) int32 opened ones.
 
-    Args:
-        size: See the top of the file.
-        opened: (N,) int32, voxels that turned free, or unexplored again.
-        voxels: (K,) int32; NONE = no voxel.
-        tree: The RayTree with which the bounds were counted.
-        bounds: (K,) float64, changed in place; inf = unknown, and stays so.
+    (K,) float64 `bounds` belong to (K,) int32 `voxels`, NONE = no voxel, and were counted with this tree. A
+    bound of inf is unknown, and stays so.
     """
     wide = tree.behind.shape
     for place in range(len(voxels)):

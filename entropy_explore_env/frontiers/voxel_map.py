@@ -96,13 +96,9 @@ def _may_stand(blocks, x, y, z):
 
 @lean_kernel
 def collect_candidates(blocks, listed, found, of_block):
-    """Fill in all candidates of (K,) int64 blocks one after the other; return how many there are.
+    """Fill in all candidates of (K,) int64 listed blocks one after the other; return how many there are.
 
-    Args:
-        blocks: See the top of the file.
-        listed: The blocks.
-        found: (N,) int32 voxels.
-        of_block: (N,) int64, each one's block, as an index in `listed`.
+    `found` are (N,) int32 voxels, `of_block` (N,) int64 each one's block, as an index in `listed`.
     """
     count = 0
     for place in range(len(listed)):
@@ -131,11 +127,7 @@ def fill_nearest(lengths, of_block, reach, nearest):
 def count_connected(blocks, found, count, most):
     """Return how many EDGE voxels are connected with some, by sides, edges or corners; at most `most`.
 
-    Args:
-        blocks: See the top of the file.
-        found: (≥ most + count,) int64, the first `count` are filled in; the others are scratch space.
-        count: How many the search begins with.
-        most: Where counting ends.
+    The search begins with the first `count` of (≥ most + count,) int64 `found`; the rest is scratch space.
     """
     size, place = blocks.size, 0
     while place < count and count < most:
@@ -158,8 +150,7 @@ def count_connected(blocks, found, count, most):
 def keep_unseen(blocks, voxels):
     """Move those of (K,) int32 voxels to the front that are unexplored and beside an edge, or one.
 
-    Returns:
-        How many there are. Dropped edges do not count.
+    Dropped edges do not count. The number of such voxels is returned.
     """
     count = 0
     for voxel in voxels:
@@ -175,13 +166,9 @@ def keep_unseen(blocks, voxels):
 
 @lean_kernel
 def first_viewing_place(blocks, places, voxels, reach):
-    """Return the index of the first of some places from which all of some voxels are visible; NONE = none.
+    """Return the index of the first of (K,) int32 voxels that shows all of (N,) others; NONE = none.
 
-    Args:
-        blocks: See the top of the file.
-        places: (K,) int32 voxels.
-        voxels: (N,) int32; if there are none, they are visible from no place.
-        reach: How far off a voxel is visible at most, in voxel edges.
+    A voxel is visible up to `reach` voxel edges off; where there is none to see, no place will do.
     """
     for number in range(len(places)):
         all_visible = len(voxels) > 0

@@ -1,4 +1,8 @@
-"""Models of a robot's scans and drives, the seconds until a scan is taken, and whether a line is free."""
+"""Models of a robot's scans and drives, the seconds until a scan is taken, and whether a line is free.
+
+Grid units. In all functions `belief` is a Belief, `drive` a DriveModel, `size` the voxels along each axis and
+`scratch` a ScanScratch.
+"""
 
 from __future__ import annotations
 
@@ -121,14 +125,8 @@ def new_scratch(grid: Grid, models: Sequence[RobotModel]) -> ScanScratch:
 def line_is_free(belief, start, finish, body_radius, scratch):
     """Return whether a ball-shaped body meets nothing believed covered on a straight line, and no boundary.
 
-    Tested along the line of its centre and, for bodies larger than half a voxel, of four points at its sides.
-
-    Args:
-        belief: A Belief.
-        start: (3,) or more numbers, x, y, z in grid units.
-        finish: The same of the line's other end.
-        body_radius: Voxel edges.
-        scratch: A ScanScratch.
+    The line leads from a place (3,) to another. It is tested along the line of the body's centre and, for
+    bodies larger than half a voxel, of four points at its sides.
     """
     size, begin = belief.size, point(start)
     x, y, z = finish[0] - begin[0], finish[1] - begin[1], finish[2] - begin[2]
@@ -174,7 +172,7 @@ def _seconds(drive, length_m, hops, here, at):
 def straight_seconds(belief, voxel_size_m, drive, here, at, scratch):
     """Return the seconds until the scan at a viewpoint (5,) is taken, on a straight line from `here` (5,).
 
-    It is inf where the line is not free by the belief; `scratch` is a ScanScratch.
+    It is inf where the line is not free by the belief.
     """
     if not line_is_free(belief, here, at, drive.body_radius, scratch):
         return math.inf
@@ -186,17 +184,8 @@ def straight_seconds(belief, voxel_size_m, drive, here, at, scratch):
 def travel_seconds(search, size, drive, voxel_size_m, here, at, reach):
     """Return the seconds until the scan at a viewpoint (5,) is taken, on the path that a search found.
 
-    Args:
-        search: The latest search, from the robot's voxel.
-        size: (X, Y, Z) voxels.
-        drive: A DriveModel.
-        voxel_size_m: Edge of a voxel.
-        here: (5,) the robot, in grid units.
-        at: (5,) the viewpoint, in grid units.
-        reach: Longest hop in voxel edges, with a scan after each; inf allowed.
-
-    Returns:
-        Seconds; inf = the search did not reach it.
+    The latest search began in the voxel of the robot, which is `here` (5,); seconds are inf where it did not
+    come. A hop is no longer than `reach` voxel edges, with a scan after each; inf allowed.
     """
     straight = math.sqrt((at[0] - here[0]) ** 2 + (at[1] - here[1]) ** 2 + (at[2] - here[2]) ** 2)
     length = 0.0

@@ -3,7 +3,8 @@
 The localization error LE of Sujan's rating function (sect. 2.3.5, eq. 23), which the paper leaves open: "the
 localization error of the agent along the path to the target", less where the path has promising fiducials.
 Landmarks are those of the world, and of the robot's own map, which take back what was added since it chose
-them, and no more.
+them, and no more. In all functions `covariance` is Σ, (4, 4) float64, of x, y, z and yaw;
+places are in metres, in the map frame.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class Surveyor(NamedTuple):
     min_range_m: float
     """It sights nothing nearer."""
     scan_every_m: float
-    """It scans under way after every so many metres; inf = at the end alone."""
+    """It scans under way after driving so far, in metres; inf = at the end alone."""
     own: np.ndarray
     """(N,) LANDMARK, of its own map; where they truly are does not matter."""
     matrices: np.ndarray
@@ -71,15 +72,8 @@ def growth_of_error(covariance, surveyor, drive, lever_m, after):
         LE = s(Σ') - s(Σ),   s(Σ)² = Σ_xx + Σ_yy + Σ_zz + L² Σ_ψψ
 
     s is the root mean square, over all horizontal directions, of how far a point is off that is measured from
-    the pose at the distance L: see `weigh_by_covariance`. Below 0 where landmarks take back more than
-    the way adds.
-
-    Args:
-        covariance: (4, 4) float64, Σ.
-        surveyor: Surveyor.
-        drive: Drive.
-        lever_m: L.
-        after: (4, 4) float64, filled with Σ'.
+    the pose at the distance L, `lever_m`: see `weigh_by_covariance`. Below 0 where landmarks take back more
+    than the way adds. Σ' is filled into `after`.
     """
     for row in range(4):
         for column in range(4):
@@ -101,11 +95,6 @@ def foresee_covariance(covariance, surveyor, drive):
 
     The estimate changes at each scan: Σ' = F Σ Fᵀ + Q for the motion since the one before, and eq. 16 for
     each landmark that should be in sight. The robot has turned to its viewpoint's gaze by its first scan.
-
-    Args:
-        covariance: (4, 4) float64, changed in place.
-        surveyor: Surveyor.
-        drive: Drive.
     """
     begin, event = point(drive.pose), point(drive.pose)
     turned = turn_between(drive.pose[3], drive.viewpoint[3])
@@ -135,14 +124,8 @@ def foresee_covariance(covariance, surveyor, drive):
 def move_and_sight(covariance, surveyor, drive, event, here, metres, turned):
     """Carry a covariance on to a scan, and take in the landmarks that should be in sight there.
 
-    Args:
-        covariance: (4, 4) float64, changed in place.
-        surveyor: Surveyor.
-        drive: Drive.
-        event: (x, y, z) of the scan before, or where the drive began.
-        here: (x, y, z) of this one.
-        metres: Driven between them.
-        turned: Radians turned between them.
+    The robot drove some metres and turned some radians from an event (x, y, z), the scan before or where the
+    drive began, to `here` (x, y, z).
     """
     params = surveyor.params[0]
     spread_yaw_error(covariance, event[1] - here[1], here[0] - event[0])
@@ -168,11 +151,8 @@ def move_and_sight(covariance, surveyor, drive, event, here, metres, turned):
 def should_be_in_sight(surveyor, viewpoint, here, away):
     """Whether a scan should sight a landmark; what is unknown hides nothing.
 
-    Args:
-        surveyor: Surveyor.
-        viewpoint: (5,), whose gaze counts.
-        here: (x, y, z), where the scan is taken, metres.
-        away: (x, y, z), from there to the landmark.
+    It is taken `here` (x, y, z) with the gaze of a viewpoint (5,), and the landmark lies `away` (x, y, z)
+    from it.
     """
     params, edge, origin = surveyor.params[0], surveyor.voxel_size_m, surveyor.origin_m
     x, y, z = away

@@ -14,7 +14,8 @@ What all rays add to a voxel counts once,
     I = Σ ½ log2(1 + Σ_rays w/σ(d)² / p),
 
 with p the voxel's precision, d the ray's length and w the probability that it gets there (Rocha04, eqs. 5, 17
-and 27). Voxels that are left to teammates count nothing. All places are in grid units.
+and 27). Voxels that are left to teammates count nothing. All places are in grid units; viewpoints are x, y,
+z, yaw, pitch. In all functions `belief` is a Belief, `scan` a ScanModel and `scratch` a ScanScratch.
 """
 
 from __future__ import annotations
@@ -175,16 +176,9 @@ def _imagine_ray(belief, scan, start, direction, count, scratch):
 
 @lean_kernel
 def imagine_scan(belief, scan, at, scratch):
-    """Add the precision that a scan from a viewpoint should bring to `scratch.added`.
+    """Add the precision that a scan from a viewpoint (5,) should bring to `scratch.added`.
 
-    Args:
-        belief: A Belief.
-        scan: A ScanModel.
-        at: (5,) x, y, z, yaw, pitch.
-        scratch: A ScanScratch.
-
-    Returns:
-        How many voxels are in `scratch.touched`.
+    The number of voxels in `scratch.touched` is returned.
     """
     start, count = (at[0], at[1], at[2]), 0
     for row in range(len(scan.pitches)):
@@ -202,7 +196,7 @@ def imagine_scan(belief, scan, at, scratch):
 
 @lean_kernel
 def expected_bits(belief, scan, at, scratch):
-    """Return the bits that a scan from a viewpoint should bring; arguments as of `imagine_scan`.
+    """Return the bits that a scan from a viewpoint (5,) should bring.
 
     Voxels that are left to teammates are marked in `scratch.left` before: see `belief.visibility.mark_cones`.
     """

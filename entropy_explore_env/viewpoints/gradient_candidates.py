@@ -1,4 +1,8 @@
-"""Viewpoints along the entropy gradient: the voxels near a robot at which the entropy of its map changes."""
+"""Viewpoints along the entropy gradient: the voxels near a robot at which the entropy of its map changes.
+
+`mean` and `precision` are (X, Y, Z) float32, expected coverage and 1/σ²; `position` is (3,), the robot in
+grid units, in which radius and reach are, too.
+"""
 
 from __future__ import annotations
 
@@ -23,21 +27,11 @@ _TOLERANCE = 1e-6
 
 @lean_kernel
 def find_gradient_candidates(precision, known_precision, position, radius, layer, candidates):
-    """Find the voxels within a radius that have a gradient: N_Γ(x, r) of RochaMI.
+    """Find the voxels within a radius of a place that have a gradient: N_Γ(x, r) of RochaMI.
 
-    The gradient is the backward difference of Rocha04's eq. 30, of the entropy that is never negative; for
-    planar robots of its projection on their layer.
-
-    Args:
-        precision: (X, Y, Z) float32 1/σ².
-        known_precision: Of a voxel that counts as known.
-        position: (3,) of the robot, grid units.
-        radius: r̂ in grid units.
-        layer: The layer of a planar robot; -1 = it flies.
-        candidates: (K,) CANDIDATE, filled in.
-
-    Returns:
-        How many there are.
+    The gradient is the backward difference of Rocha04's eq. 30, of the entropy that is never negative, above
+    that of a voxel of `known_precision`; for planar robots of its projection on their layer, -1 = the robot
+    flies. (K,) CANDIDATE are filled in, and the number of them is returned.
     """
     count, reach, size = 0, radius * (1.0 + _TOLERANCE), precision.shape
     low_x, high_x = _span(position[0], reach, size[0])
@@ -73,20 +67,9 @@ def steepest_viewpoint(mean, precision, position, yaw, pitch, reach, projected, 
         free-flying:  argmax ‖∇h(l)‖ (1 - μ_l),                     gaze along ∇h
         projected:    argmax ρ(pos, l) ‖proj ∇h(l)‖ (1 - μ_l),      gaze along proj ∇h
 
-    Of equal voxels the first in C order is taken.
-
-    Args:
-        mean: (X, Y, Z) float32, expected coverage.
-        precision: (X, Y, Z) float32, 1/σ².
-        position: (3,) float64, the robot in grid units.
-        yaw: Of the robot, radians.
-        pitch: Of the robot, radians, downwards.
-        reach: ξ in grid units.
-        projected: Whether the robot's motion plane counts.
-        viewpoint: (5,) float64, filled with the voxel's centre in grid units, yaw and pitch.
-
-    Returns:
-        Whether the gradient there is not zero; if it is, `viewpoint` is as it was.
+    The robot's motion plane is that of its yaw and pitch. Of equal voxels the first in C order is taken. (5,)
+    float64 `viewpoint` is filled with the voxel's centre, yaw and pitch, and True is returned, unless the
+    gradient is zero everywhere.
     """
     ahead = (math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), -math.sin(pitch))
     left = (-math.sin(yaw), math.cos(yaw), 0.0)

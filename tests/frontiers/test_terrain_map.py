@@ -167,7 +167,7 @@ def test_a_block_gives_a_column_that_was_reached_or_has_room_left():
 
 
 def test_the_height_factor_by_hand():
-    """(z_f - z_av)^γ z_f^(1 - γ), and nothing for who is too high."""
+    """(z_f - z_av)^γ z_f^(1 - γ), and nothing for places that are too high."""
     ground = np.full((9, 13), 2, np.int32)
     ground[7:] = NONE
     terrain = known_ground(ground)
