@@ -145,6 +145,6 @@ def episodes_row(missions: int) -> Row:
     recorded = observed_scenario(with_settings(ROOM, {"robots": 3}), _OBSERVED)
     with tempfile.TemporaryDirectory() as folder:
         shard = Shard(recorded, "planned-rate", Surroundings(), 0, missions, str(Path(folder)))
-        record = shard.run().record
+        record = shard.run()
     job = "a robot-step of planned-rate in room as Parquet"
     return alone(job, [record["bytes"] / (record["rows"] - 3 * missions)], "bytes")
