@@ -15,7 +15,7 @@ from baselines.strategies.next_best_view.expected_view import (
     new_view,
     occupancy_map,
 )
-from baselines.strategies.next_best_view.pose_samples import drawn_poses, pose_in, reachable_voxels
+from baselines.strategies.next_best_view.pose_samples import drawn_poses, poses_in, reachable_voxels
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, belief_of
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import FrontierRule
@@ -90,13 +90,12 @@ class DrawnPoses(FrontierRule):
         in_vain, expectations.measured = measured == expectations.measured, measured
         best = 0
         if not (in_vain and self.escapes):
-            poses = [pose_in(view, voxel, *gaze) for voxel, gaze in zip(voxels.tolist(), gazes, strict=True)]
-            best = self._best(scene, known, poses)
+            best = self._best(scene, known, poses_in(view, voxels, gazes))
         yaw, pitch = gazes[best].tolist()
         return Goal(int(voxels[best]), int(voxels[best]), gaze=(yaw, pitch))
 
-    def _best(self, scene: Scene, known: OccupancyMap, poses: list[np.ndarray]) -> int:
-        """Return the number of the pose that is worth most, the first of equals."""
+    def _best(self, scene: Scene, known: OccupancyMap, poses: np.ndarray) -> int:
+        """Return which of the poses (K, 5) is worth most, the first of equals."""
         grid, expectations = self._scenario.grid, self._expectations[scene.view.robot]
         scan = self._scans[scene.view.kind]
         if self.extrapolates:

@@ -59,10 +59,13 @@ def yaws_around(wide_rad: float) -> list[float]:
     return [2.0 * math.pi * turn / turns for turn in range(turns)]
 
 
-def pose_in(view: RobotKnowledge, voxel: int, yaw: float, pitch: float) -> np.ndarray:
-    """Return the pose (5,) in the middle of a voxel, map frame; planar robots stay at their height."""
+def poses_in(view: RobotKnowledge, voxels: int | np.ndarray, gazes: np.ndarray) -> np.ndarray:
+    """Return the poses (..., 5) in the middle of (...) voxels with (..., 2) yaws and pitches, map frame.
+
+    Planar robots stay at their height.
+    """
     grid = view.scenario.grid
-    place = grid.centre_of(np.stack(np.unravel_index(voxel, grid.shape)))
+    places = grid.centre_of(np.stack(np.unravel_index(voxels, grid.shape), axis=-1))
     if view.planar:
-        place[2] = view.pose[2]
-    return np.array([*place, yaw, pitch])
+        places[..., 2] = view.pose[2]
+    return np.concatenate([places, gazes], axis=-1)

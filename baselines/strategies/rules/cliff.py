@@ -20,7 +20,7 @@ import numpy as np
 from baselines.strategies.next_best_view.elevation_view import fill_new_information
 from baselines.strategies.next_best_view.ground_map import EdgeForm, GroundMap, camera_of
 from baselines.strategies.next_best_view.plateau_rule import STEEP_RAD, PlateauRule
-from baselines.strategies.next_best_view.pose_samples import drawn_poses, pose_in
+from baselines.strategies.next_best_view.pose_samples import drawn_poses, poses_in
 from baselines.strategies.next_best_view.rating import pose_distance
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
@@ -57,10 +57,7 @@ class CliffNextBestView(PlateauRule):
     def pick(self, view: RobotKnowledge, ground: GroundMap, reachable: np.ndarray) -> np.ndarray:
         """Return the best rated of the poses drawn; see `PlateauRule`."""
         voxels, gazes = drawn_poses(self._rng, reachable, _POSES, (0.0, STEEP_RAD))
-        poses = [
-            pose_in(view, voxel, yaw, pitch)
-            for voxel, (yaw, pitch) in zip(voxels.tolist(), gazes.tolist(), strict=True)
-        ]
+        poses = poses_in(view, voxels, gazes)
         scaled, bits = np.stack([view.scenario.grid.in_grid_units(pose) for pose in poses]), np.empty(_POSES)
         fill_new_information(ground.ground(view), camera_of(view), _MOST_MEASUREMENTS, scaled, bits)
         distances = np.array([pose_distance(view.pose, pose) for pose in poses])

@@ -14,7 +14,7 @@ import numpy as np
 
 from baselines.strategies.next_best_view.ground_map import GroundMap
 from baselines.strategies.next_best_view.plateau_rule import PlateauRule
-from baselines.strategies.next_best_view.pose_samples import pose_in
+from baselines.strategies.next_best_view.pose_samples import poses_in
 from baselines.strategies.rules.raster import RasterScan
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
@@ -43,4 +43,5 @@ class CliffRaster(PlateauRule):
     def pick(self, view: RobotKnowledge, ground: GroundMap, reachable: np.ndarray) -> np.ndarray:
         """Return the next place and gaze, the rover's own where none is left; see `PlateauRule`."""
         voxel, yaw = self._scans[view.robot].next_scan(view, reachable, _SPACING_M)
-        return view.pose.copy() if voxel == NONE else pose_in(view, voxel, yaw, _AHEAD_RAD)
+        gaze = np.array([yaw, _AHEAD_RAD])
+        return view.pose.copy() if voxel == NONE else poses_in(view, voxel, gaze)

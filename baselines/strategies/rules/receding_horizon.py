@@ -82,7 +82,8 @@ class RecedingHorizon(FrontierRule):
         for size in _SIZES:
             self._grow(scene, tree, free, size)
             indices = np.array(tree.places).astype(int)
-            voxels = np.ravel_multi_index(tuple(indices.T), scene.view.scenario.grid.shape).astype(np.int32)
+            numbers = np.ravel_multi_index(tuple(indices.T), scene.view.scenario.grid.shape)
+            voxels = np.asarray(numbers, np.int32)
             worth = _gains(scene, tree, voxels, scanned)
             if worth.max() >= _LEAST_GAIN:
                 first, *rest = tree.branch_to(int(np.argmax(worth)))
