@@ -72,15 +72,7 @@ def settings_of_policy(
     privileged: int = 0,
     attention_layers: int = ATTENTION_LAYERS,
 ) -> PolicySettings:
-    """The settings of a new policy.
-
-    Args:
-        scenario: Of training.
-        features: A name of NETWORKS.
-        hidden: Units of the hidden layers; over candidates one number, the units of each.
-        privileged: Numbers that follow an observation in training, for the critic over candidates.
-        attention_layers: Of the actor over candidates.
-    """
+    """Return the settings of a new policy, with the version of its features: see PolicySettings."""
     version = FEATURES_VERSION if features == "candidates" else None
     return PolicySettings(scenario, features, hidden, privileged, version, attention_layers)
 

@@ -74,7 +74,6 @@ from training.runs import (
     TrainingState,
     check_finite,
     check_options,
-    check_share,
     check_unused,
     checkpoint_to_resume,
     options_json,
@@ -212,11 +211,8 @@ class Args:
 def check(args: Args) -> None:
     """Raise a SettingError where an option is out of its range."""
     check_options(args)
-    for name in ("threads", "rollout_steps", "validate_every", "validation_missions"):
+    for name in ("threads", "rollout_steps"):
         check_whole(name, getattr(args, name), 1)
-    check_share("gamma", args.gamma)
-    if not 0.0 <= args.entropy < np.inf:
-        raise SettingError("entropy", args.entropy, "a number ≥ 0")
     if args.patch and args.features != "maps":
         raise SettingError("patch", args.patch, "used with --features maps, whose networks read it")
     if args.target_kl is not None and not 0.0 < args.target_kl < np.inf:

@@ -55,7 +55,6 @@ from training.runs import (
     FILE,
     check_new,
     check_options,
-    check_share,
     resume_command,
     resumed_options,
     save_options,
@@ -181,11 +180,6 @@ def check(args: Args) -> None:
     check_whole("minibatch", args.minibatch, 1)
     if args.minibatch > args.batch:
         raise SettingError("minibatch", args.minibatch, f"at most the batch, {args.batch}")
-    for name in ("validate_every", "validation_missions"):
-        check_whole(name, getattr(args, name), 1)
-    check_share("gamma", args.gamma)
-    if not 0.0 <= args.entropy < math.inf:
-        raise SettingError("entropy", args.entropy, "a number ≥ 0")
     check_address(args.address)
 
 

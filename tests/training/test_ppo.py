@@ -18,10 +18,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from gymnasium import spaces
 
 from baselines.experiments.mission import Surroundings
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
+from entropy_explore_env.scenarios import SCENARIOS
 from tests.systems import needs_posix
 from training import ppo
 from training.advantages import DecisionBuffer
@@ -362,3 +364,35 @@ def test_a_best_policy_without_a_checkpoint_counts_as_a_run_and_a_resumed_run_re
     assert later.is_dir()
     assert resume(out) == 0
     assert not later.is_dir() and len(list(out.glob("best-*"))) >= 1
+
+
+FEW = (
+    "--missions 2 --rollout-steps 4 --batch 8 --epochs 1 --validation-missions 1 --time-limit-s 3 "
+    "--no-video --json"
+).split()
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_the_defaults_make_a_policy_for_every_named_scenario(name):
+    args = ppo.parsed(["--scenario", name, "--missions", "1"])
+    ppo.check(args)
+    task = ppo.training_task(args)
+    scenario, state = task.scenario, ppo.set_up(args, task)
+    moves = 5 if scenario.in_planes else 7
+    gazes = args.yaws * (1 if scenario.planar else args.pitches)
+    actions = state.envs.action_space
+    assert isinstance(actions, spaces.Discrete) and actions.n == moves * gazes
+    assert state.model.policy.observation_space == state.envs.observation_space
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name == "office" else pytest.mark.long) for name in SCENARIOS]
+)
+def test_training_begins_in_every_named_scenario(name, tmp_path, capsys):
+    """Three rollouts and updates, a validation and a checkpoint."""
+    robots = ppo.training_task(ppo.parsed(["--scenario", name])).scenario.robots
+    steps = 3 * 4 * 2 * robots
+    words = [*FEW, "--scenario", name, "--total-steps", str(steps), "--out", str(tmp_path / "run")]
+    assert ppo.run_command(ppo.main, words) == 0
+    assert json.loads(capsys.readouterr().out)["steps"] == steps
+    assert list((tmp_path / "run").glob("step-*"))

@@ -158,10 +158,8 @@ def test_a_loss_that_is_not_finite_stops_and_keeps_the_last_checkpoint(bad, tmp_
 def test_an_iteration_without_decisions_is_repeated_and_many_end_the_run(tmp_path, capsys):
     once = Scripted([None, 0.1, None, None, 0.1])
     assert iterate(args_for(tmp_path, 200), once, iteration=0)
-    assert [row.split(",")[:2] for row in (tmp_path / "progress.csv").read_text().splitlines()[1:]] == [
-        ["1", "100"],
-        ["2", "200"],
-    ]
+    rows = (tmp_path / "progress.csv").read_text().splitlines()
+    assert [row.split(",")[:2] for row in rows[1:]] == [["1", "100"], ["2", "200"]]
     assert capsys.readouterr().err.count("no runner has reported: once more") == 3
     with pytest.raises(SilentRunnersError, match="none of 2 runners reported within 900 s, after 100 dec"):
         iterate(args_for(tmp_path, 900), Scripted([0.1, None, None, None, 0.1]), iteration=0)

@@ -35,17 +35,11 @@ def pairs_of(slope: np.ndarray, number: int, noise: float, seed: int) -> Pairs:
     return Pairs(directions, slopes, np.zeros(number))
 
 
-def test_the_slope_is_found_where_the_noise_is_small():
-    true = np.linspace(-0.02, 0.03, SIZE)
-    slope, length = shrunk_slope([[pairs_of(true, 4000, 0.01, 0)]])
-    assert np.abs(slope - true).max() < 1e-3
-    assert length == pytest.approx(np.linalg.norm(true), rel=0.02)
-
-
 def test_the_slope_of_several_tasks_is_their_mean():
     one, other = np.zeros(SIZE), np.zeros(SIZE)
     one[0], other[1] = 0.04, -0.02
-    slope, _ = shrunk_slope([[pairs_of(one, 3000, 0.005, 1), pairs_of(other, 3000, 0.005, 2)]])
+    slope, length = shrunk_slope([[pairs_of(one, 3000, 0.005, 1), pairs_of(other, 3000, 0.005, 2)]])
+    assert length == pytest.approx(np.linalg.norm([0.02, -0.01]), rel=0.05)
     assert slope[:2] == pytest.approx([0.02, -0.01], abs=1e-3) and np.abs(slope[2:]).max() < 1e-3
 
 
