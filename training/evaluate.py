@@ -26,11 +26,11 @@ from baselines.cli.task_options import (
     tasked,
 )
 from baselines.cli.worker_options import WorkerOptions
-from baselines.experiments.cells import Cell, run_cells
 from baselines.experiments.mission import Surroundings
-from baselines.experiments.outcome import Record
 from baselines.experiments.ray_cluster import RayCluster
+from baselines.experiments.rows import Record
 from baselines.experiments.statistics import median_interval, median_ratio_interval
+from baselines.experiments.trials import Cell, How, by_cell, run_cells
 from baselines.strategies import is_learned, make_strategy, resolved
 from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.explorer import PlannedRate
@@ -198,7 +198,7 @@ def compare(
     cells = [
         Cell(f"{folder}/{name}", scenario, name, seeds, surroundings=around) for name in (policy, *rivals)
     ]
-    records = run_cells(cells, runs, workers, "evaluation", quiet=quiet)
+    records = by_cell(run_cells(cells, runs / "missions.jsonl", How(workers, "evaluation", quiet)))
     missions = {name: records[cell.id] for name, cell in zip((policy, *rivals), cells, strict=True)}
     times = {name: np.array([record["t_mission_s"] for record in own]) for name, own in missions.items()}
     rows = [_row(name, missions[name], times[name], times[policy], name == policy) for name in missions]

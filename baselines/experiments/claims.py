@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import sys
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from pathlib import Path
 from typing import Any
 
-from baselines.cli.arguments import print_json
 from baselines.experiments.statistics import Interval
 from baselines.experiments.tables import csv_table, markdown_table
 from entropy_explore_env.errors import SettingError
@@ -55,27 +51,6 @@ def above(name: str, text: str, found: Interval, least: float = 1.0) -> Claim:
 def below(name: str, text: str, found: Interval, most: float = 1.0) -> Claim:
     """Return the claim that something is below a number: it holds if the whole interval is."""
     return Claim(name, text, f"< {most:g}", *found, found.high < most)
-
-
-def claims_table(claims: Sequence[Claim], interval_digits: int = _DIGITS, given: str = "paper") -> str:
-    """The claims as a Markdown table.
-
-    Args:
-        claims: A row each.
-        interval_digits: Significant digits of the ends of intervals.
-        given: Head of the column of figures that were given.
-    """
-    rows = [
-        [
-            claim.claim,
-            _shown(claim.paper),
-            _shown(claim.ours),
-            _interval(claim, interval_digits),
-            "yes" if claim.holds else "**no**",
-        ]
-        for claim in claims
-    ]
-    return markdown_table(["claim", given, "ours", "95 % interval", "holds"], rows)
 
 
 def groups_table(claims: Sequence[Claim], groups: Mapping[str, str]) -> str:
@@ -139,31 +114,6 @@ def print_claims(claims: Sequence[Claim], paper: str) -> None:
         holds = "[green]yes[/green]" if claim.holds else "[red]no[/red]"
         table.add_row(claim.claim, _shown(claim.paper), _shown(claim.ours), _interval(claim), holds)
     Console().print(table)
-
-
-def report_claims(
-    paper: str, claims: Sequence[Claim], report: Path, started: float, as_json: bool, strict: bool
-) -> int:
-    """Print the results of a reproduction in the requested form.
-
-    Args:
-        paper: Short name.
-        claims: Of the paper.
-        report: The page that was written.
-        started: `time.perf_counter()` when the work began.
-        as_json: One JSON object instead of a table.
-        strict: Whether a claim that does not hold is a failure.
-
-    Returns:
-        The command's exit code.
-    """
-    if as_json:
-        wall_s = round(time.perf_counter() - started, 1)
-        print_json({"paper": paper, "claims": [claim.row() for claim in claims], "wall_s": wall_s})
-    else:
-        print_claims(claims, paper)
-        print(f"written: {report}, its figures and tables beside it", file=sys.stderr)
-    return 1 if strict and not all(claim.holds for claim in claims) else 0
 
 
 def _shown(value: float | str | None, digits: int = _DIGITS) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from baselines.experiments.outcome import Record
+from baselines.experiments.rows import Record
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Stopwatch, Strategy, choose_all
 from entropy_explore_env.decision_settings import Observation

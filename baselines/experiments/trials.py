@@ -308,6 +308,8 @@ def _strategy_files(name: str) -> list[Path]:
     """Return the files of a strategy that no commit of this repository says: weights, modules of others."""
     if strategies.is_learned(name):
         return strategies.learned_policies().policy_files(name)
+    if Path(name).is_file():
+        return [Path(name)]  # weights of the planner
     source = strategies.strategy_module(name)
     if isinstance(source, Path):
         return [source]

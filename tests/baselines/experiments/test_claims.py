@@ -1,25 +1,44 @@
-"""Claims as rows of JSON and of tables."""
+"""Claims as rows of JSON, and of the tables of pages."""
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 
-from baselines.experiments.claims import Claim, claims_table
+import pytest
 
-CLAIM = Claim("t", "falls", "< 1", 0.51239, 0.4, 12345.6, True)
+from baselines.experiments.claims import Claim, above, below, claims_csv, groups_table
+from baselines.experiments.statistics import Interval
+from entropy_explore_env.errors import SettingError
+
+CLAIM = Claim("t-1", "falls", "< 1", 0.51239, 0.4, 12345.6, True)
+OTHERS = [
+    Claim("t-2", "falls", "< 1", 2.0, None, None, False),
+    Claim("u", "place", None, "3 of 5", None, None, True),
+]
 
 
-def test_a_claim_is_a_row_of_json():
+def test_a_claim_is_a_row_of_json_and_of_csv():
     row = CLAIM.row()
     assert list(row) == ["id", "claim", "paper", "ours", "low", "high", "holds"]
     assert json.loads(json.dumps(row)) == row
+    (found,) = csv.DictReader(io.StringIO(claims_csv([CLAIM])))
+    assert found["ours"] == "0.51239" and found["holds"] == "True"
 
 
-def test_the_table_of_claims_shows_four_digits_and_what_does_not_hold():
-    lines = claims_table([CLAIM, Claim("u", "rises", None, 2.0, None, None, False)]).splitlines()
-    assert lines[0] == "| claim | paper | ours | 95 % interval | holds |"
-    assert lines[2] == "| falls | < 1 | 0.5124 | 0.4 … 12,346 | yes |"
-    assert lines[3] == "| rises | - | 2 |  | **no** |"
-    assert "| 0.5124 | 0.4 …" in claims_table([CLAIM], interval_digits=1)
-    narrow = claims_table([Claim("v", "is", 1.0, 0.59, 0.5678, 0.6123, True)], interval_digits=2)
-    assert "| 0.59 | 0.57 … 0.61 |" in narrow
+def test_claims_stand_in_groups_with_what_ours_span_and_how_many_hold():
+    lines = groups_table([CLAIM, *OTHERS], {"t-": "it falls", "u": "places", "v": "no claim"}).splitlines()
+    assert lines[0] == "| claim | paper | ours (95 % interval, or span) | hold |"
+    assert lines[2:] == ["| it falls | < 1 | 0.512 … 2 | 1 of 2 |", "| places | - | 3 of 5 | 1 of 1 |"]
+    (line,) = groups_table([CLAIM], {"": "all", "t-": "it falls"}).splitlines()[2:]  # the longest beginning
+    assert line == "| it falls | < 1 | 0.5124 (0.4 … 12,346) | 1 of 1 |"
+    with pytest.raises(SettingError, match="claim = 'u': allowed is in a group: t-"):
+        groups_table(OTHERS, {"t-": "it falls"})
+
+
+def test_above_and_below_ask_for_the_whole_interval():
+    interval = Interval(1.2, 1.1, 1.3)
+    assert above("a", "x", interval).holds and not above("a", "x", interval, 1.15).holds
+    assert below("a", "x", interval, 1.5).paper == "< 1.5" and not below("a", "x", interval).holds
+    assert f"{interval}" == "1.2 (1.1 … 1.3)" and f"{interval:.2f}" == "1.20 (1.10 … 1.30)" == interval.text()

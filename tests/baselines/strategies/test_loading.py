@@ -11,9 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from baselines.experiments import provenance
 from baselines.experiments.mission import run_mission, scripted_env
-from baselines.experiments.provenance import code_digest
 from baselines.strategies import STRATEGIES, make_strategy, strategy_module
 from baselines.strategies.rules.gradient import GradientStrategy
 from entropy_explore_env.errors import ActionError, SettingError
@@ -154,26 +152,6 @@ def test_what_is_refused_says_why_in_one_line(file, name, said):
         make_strategy(name)
     assert raised.value.field == "strategy" and said in str(raised.value)
     assert "\n" not in str(raised.value)
-
-
-def test_the_digest_covers_the_file_and_what_it_imports(file):
-    """In a process that has not imported it yet: what was imported stays as it was."""
-
-    def digest(source):
-        file.write_text(source)
-        provenance.imported.cache_clear()
-        provenance._module.cache_clear()
-        return code_digest(strategy=f"{file}:Own")
-
-    first = digest(SOURCE)
-    assert digest(SOURCE + "# the same") == first
-    changed = digest(SOURCE.replace("return view.pose", "return view.target"))
-    assert changed != first
-    assert digest(SOURCE + "import baselines.strategies.gradient\n") not in (first, changed)
-    (file.parent / "own_neighbour.py").write_text("A = 1\n")
-    beside = digest(SOURCE + "import own_neighbour\n")
-    (file.parent / "own_neighbour.py").write_text("A = 2\n")
-    assert digest(SOURCE + "import own_neighbour\n") != beside
 
 
 def test_where_strategies_are_defined(file):
