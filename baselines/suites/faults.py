@@ -107,9 +107,12 @@ class Times:
         """Take the records by cell."""
         self._suite, self._records = suite, records
         self._tasks = {task.name: task for task in suite.tasks}
-        self.teams = [team for team in TEAMS if task_name(*team, NOTHING_FAILS) in self._tasks]
         self.missions = max(task.missions for task in suite.tasks)
         self.strategies = suite.strategies
+        self.teams = [team for team in TEAMS if self._ran(*team)]
+
+    def _ran(self, scenario: str, robots: int) -> bool:
+        return any(self.records(scenario, robots, name, NOTHING_FAILS) for name in self.strategies)
 
     def records(self, scenario: str, robots: int, strategy: str, condition: str) -> dict[int, Record]:
         """Return the records of a cell by seed; none if it was not run."""

@@ -144,6 +144,7 @@ def test_the_command_writes_a_page_and_makes_it_again_of_its_archive(tmp_path, c
     assert run_command(benchmark.main, [*words, "--out", str(tmp_path), "--json"]) == 0
     page, picture = tmp_path / "faults.md", tmp_path / "faults" / "faults.png"
     before = page.read_text(), picture.read_bytes()
+    assert "office" not in before[0].split("## Claims")[1]  # which was not run
     assert "40 missions, 2 a point" in before[0] and "| `gradient` | room, 4 |" in before[0]
     printed = json.loads(capsys.readouterr().out)
     assert len(printed["tasks"]) == 2 * len(CONDITIONS) and printed["failed"] == []
