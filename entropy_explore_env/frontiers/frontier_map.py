@@ -244,7 +244,8 @@ class FrontierMap(ABC):
 
     def release(self) -> None:
         """Forget all promises."""
-        self._counter.promised[:] = 0
+        if self._counter.promises[0] > 0:
+            self._counter.promised[:] = self._counter.promises[:] = 0
 
     def expected(self, place: np.ndarray) -> np.ndarray:
         """Return (X, Y) bool, columns with points that are expected to be seen from (3,), grid units."""

@@ -35,8 +35,12 @@ class RayTree(NamedTuple):
     """(N, 3) int32, along the axes."""
     offset: np.ndarray
     """(N,) int64, the same as a difference of voxel numbers."""
+    cell: np.ndarray
+    """(N,) uint32, number of the voxel among the C that the tree's rays cross; several nodes may have one."""
+    cells: int
+    """C."""
     after: np.ndarray
-    """(N,) int64, the next node if this one stops its rays."""
+    """(N,) uint32, the next node if this one stops its rays."""
     behind: np.ndarray
     """(2 M_x + 1, 2 M_y + 1, 2 M_z + 1) int32: how many nodes lie in a voxel or behind it, by its steps from
     the first voxel, plus M. No more than these are newly visible where the voxel turns free."""
@@ -96,10 +100,13 @@ def grow_tree(directions: np.ndarray, reach: float, size: tuple[int, int, int]) 
     depth = np.nonzero(new)[1]
     _find_next(depth, np.empty_like(depth), after)
     np.add.at(behind.reshape(-1), voxels[new], after - np.arange(len(after)))
+    cells, cell = np.unique(voxels[new], return_inverse=True)
     return RayTree(
         steps.astype(np.int32),
         steps @ np.array([size[1] * size[2], size[2], 1]),
-        after,
+        cell.astype(np.uint32),
+        len(cells),
+        after.astype(np.uint32),
         behind,
         low=tuple(steps.min(0).tolist()),
         high=tuple(steps.max(0).tolist()),

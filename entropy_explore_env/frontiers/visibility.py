@@ -43,6 +43,8 @@ class VisibilityCounter(NamedTuple):
     """(N,) int32, number of the latest count that met a point."""
     promised: np.ndarray
     """(N,) uint8, number of robots that will see a point."""
+    promises: np.ndarray
+    """(1,) int64, how many points were promised since the latest release."""
     latest: np.ndarray
     """(1,) int64, number of the latest count."""
     crossing: Crossing
@@ -54,7 +56,11 @@ def new_counter(points: int, shape: tuple[int, int, int]) -> VisibilityCounter:
     longest = longest_crossing(*shape, math.inf, 2)
     crossing = Crossing(np.zeros(longest, np.int32), np.zeros(longest, np.int64))
     return VisibilityCounter(
-        np.zeros(points, np.int32), np.zeros(points, np.uint8), np.zeros(1, np.int64), crossing
+        np.zeros(points, np.int32),
+        np.zeros(points, np.uint8),
+        np.zeros(1, np.int64),
+        np.zeros(1, np.int64),
+        crossing,
     )
 
 
@@ -74,6 +80,7 @@ def count_point(counter, point, marking):
     promises = np.int64(counter.promised[point])
     if marking:
         counter.promised[point] = min(promises + 1, 255)
+        counter.promises[0] += 1
     return _WEIGHTS[promises]
 
 
@@ -113,41 +120,57 @@ def count_in_ball(counter, state, size, start, reach, marking):
 
 
 @lean_kernel
-def count_from(counter, state, size, voxels, tree, seen, weighed):
+def count_from(counter, state, size, voxels, tree, met, seen, weighed):
     """Count from the centres of (K,) int32 voxels what `count_crossed` finds there, with the rays as a tree.
 
-    (K,) `seen` and `weighed` are filled in with the numbers of points and the sums of weights.
+    (K,) `seen` and `weighed` are filled in with the numbers of points and the sums of weights; `met` is (C,)
+    int32 scratch space.
     """
+    for cell in range(len(met)):
+        met[cell] = -1
+    promises = counter.promises[0] > 0
     for place in range(len(voxels)):
         at, inside = grid_index(size, voxels[place]), True
         for axis in range(3):
             inside &= at[axis] + tree.low[axis] >= 0 and at[axis] + tree.high[axis] < size[axis]
-        number = start_count(counter)
-        if inside:
-            seen[place], weighed[place] = _count_branches(counter, state, size, tree, at, number, True)
+        start = at, place
+        if inside and not promises:
+            found = _count_branches(counter, state, size, tree, met, start, True, False)
+        elif inside:
+            found = _count_branches(counter, state, size, tree, met, start, True, True)
         else:
-            seen[place], weighed[place] = _count_branches(counter, state, size, tree, at, number, False)
+            found = _count_branches(counter, state, size, tree, met, start, False, True)
+        seen[place], weighed[place] = found
 
 
 @inlined_kernel
-def _count_branches(counter, state, size, tree, at, number, inside):
-    """Count along the tree's branches from a voxel; with `inside` no ray leaves the workspace: a constant."""
-    voxel = flat_index(size, at[0], at[1], at[2])
-    points, weighed, node = 0, 0.0, 0
-    while node < len(tree.after):
+def _count_branches(counter, state, size, tree, met, start, inside, promises):
+    """Count along the tree's branches from a voxel, the `start`: its indices, and its number in the call.
+
+    With `inside` no ray leaves the workspace, and without `promises` all weights are 1: constants, both of
+    which save time.
+    """
+    at, place = start
+    voxel = np.int64(flat_index(size, at[0], at[1], at[2]))
+    points, weighed, node = 0, 0.0, np.uint32(0)
+    while node < np.uint32(len(tree.after)):
         if not inside:
             x, y, z = at[0] + tree.steps[node, 0], at[1] + tree.steps[node, 1], at[2] + tree.steps[node, 2]
             if not (0 <= x < size[0] and 0 <= y < size[1] and 0 <= z < size[2]):
                 node = tree.after[node]
                 continue
-        there = np.uint64(voxel + tree.offset[node])
+        there, cell = np.uint64(voxel + tree.offset[node]), tree.cell[node]
         flags = state[there]
-        if flags & UNEXPLORED and counter.stamp[there] != number:
-            counter.stamp[there] = number
-            points += 1
+        fresh = (flags & UNEXPLORED != 0) & (met[cell] != place)
+        met[cell] = place
+        points += np.int64(fresh)
+        if promises and fresh:
             weighed += _WEIGHTS[counter.promised[there]]
-        node = tree.after[node] if flags > _STOPS_RAYS and node > 0 else node + 1
-    return points, weighed
+        if flags > _STOPS_RAYS and node > 0:
+            node = tree.after[node]
+        else:
+            node += np.uint32(1)
+    return points, weighed if promises else float(points)
 
 
 @lean_kernel

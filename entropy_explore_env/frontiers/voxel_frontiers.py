@@ -66,6 +66,7 @@ class VoxelFrontiers(FrontierMap):
         self._pitches = imagined_pitches(kind, layer is None)
         self._rays = rays_around(self.reach, self._pitches)
         self._tree = grow_tree(self._rays, self.reach, self._size)
+        self._met = np.empty(self._tree.cells, np.int32)
         self._gaze_pitches = (0.0, -0.7, 0.7) if layer is None else (0.0,)
         self.batch = 1 + BATCH_CELLS // len(self._tree.after)
         self.point = edge ** (2 if scenario.grid.flat else 3)
@@ -109,7 +110,8 @@ class VoxelFrontiers(FrontierMap):
 
     def _count_from(self, voxels: np.ndarray, seen: np.ndarray, weighed: np.ndarray) -> None:
         """See `FrontierMap`."""
-        count_from(self._counter, self._states.state, self._size, voxels, self._tree, seen, weighed)
+        arrays = self._counter, self._states.state, self._size, voxels, self._tree
+        count_from(*arrays, self._met, seen, weighed)
 
     def _count_rays(self, place: np.ndarray, rays: np.ndarray, marking: bool) -> tuple[int, float]:
         """See `FrontierMap`."""
@@ -219,7 +221,10 @@ class VoxelFrontiers(FrontierMap):
 
     def _surroundings(self, voxel: int) -> bytes:
         """Return the states of the voxels around one."""
-        return self._states.state[voxels_around(self._size, voxel, self._radius, -1)].tobytes()
+        low = [max(int(at) - self._radius, 0) for at in np.unravel_index(voxel, self._size)]
+        (x, y, z), wide = low, 2 * self._radius + 1
+        state = self._states.state.reshape(self._size)
+        return state[x : x + wide, y : y + wide, z : z + wide].tobytes()
 
     def _edges_beside(self, voxel: int) -> np.ndarray:
         """Return (N,) int64 voxels of the body's footprint in a voxel that lie beside unknown ones."""

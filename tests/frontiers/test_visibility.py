@@ -104,7 +104,7 @@ def test_rays_around_miss_no_voxel_within_reach():
     assert seen >= inside
     many, values = np.empty(2), np.empty(2)
     voxels, tree = np.array([0, 20 * 43 + 21], np.int32), grow_tree(directions, reach, shape)
-    count_from(counter, state.reshape(-1), shape, voxels, tree, many, values)
+    count_from(counter, state.reshape(-1), shape, voxels, tree, np.empty(tree.cells, np.int32), many, values)
     assert many[1] == seen and many[0] < seen / 3
 
 
@@ -118,7 +118,7 @@ def test_a_tree_of_rays_sees_from_every_voxel_what_the_rays_see(shape, reach, pr
         count_crossed(counter, flat, shape, other, directions, 6.0, True)
     voxels, seen, weighed = np.arange(state.size, dtype=np.int32), *np.empty((2, state.size))
     tree = grow_tree(directions, reach, shape)
-    count_from(counter, flat, shape, voxels, tree, seen, weighed)
+    count_from(counter, flat, shape, voxels, tree, np.empty(tree.cells, np.int32), seen, weighed)
     for voxel, points, value in zip(voxels, seen, weighed, strict=True):
         start = tuple(int(i) + 0.5 for i in np.unravel_index(voxel, shape))
         wanted = count_crossed(counter, flat, shape, start, directions, reach, False)
@@ -149,14 +149,14 @@ def test_bounds_stay_bounds_when_walls_turn_out_free(shape, reach, seed):
     counter, flat = new_counter(state.size, shape), state.reshape(-1)
     tree, voxels = grow_tree(rays(shape), reach, shape), np.arange(-1, state.size, dtype=np.int32)
     counted, now, _ = np.empty((3, state.size))
-    count_from(counter, flat, shape, voxels[1:], tree, counted, _)
+    count_from(counter, flat, shape, voxels[1:], tree, np.empty(tree.cells, np.int32), counted, _)
     seen = np.concatenate([[5.0], counted])
     seen[3] = math.inf
     walls = np.flatnonzero(flat & COVERED)
     opened = rng.choice(walls, min(int(rng.integers(0, 4)), len(walls)), replace=False).astype(np.int32)
     flat[opened] = UNEXPLORED
     raise_bounds(shape, opened, voxels, tree, seen)
-    count_from(counter, flat, shape, voxels[1:], tree, now, _)
+    count_from(counter, flat, shape, voxels[1:], tree, np.empty(tree.cells, np.int32), now, _)
     assert (seen[1:] >= now).all()
     assert seen[0] == 5.0 and math.isinf(seen[3])
     opened_ones = np.zeros(shape, np.uint8)
