@@ -136,7 +136,7 @@ def test_weights_of_other_networks_are_refused(trained, tmp_path, capsys):
         ({"candidate_features": 3}, "candidate_features = 'score'"),
         (
             {"observation": {"candidates": [5, 99]}},
-            r"observation candidates = \[5, 99\]: allowed is \[5, 34\]",
+            rf"observation candidates = \[5, 99\]: allowed is \[5, {len(COLUMNS)}\]",
         ),
         ({"observation": "all"}, "observation candidates = None"),
         ({"scenario": {"robots": 0}}, "scenario"),
