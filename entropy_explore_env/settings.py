@@ -286,10 +286,11 @@ class Ending:
 
     With `seen_share` or `unseen_free_voxels`, one of the two, the threshold ends nothing; rewards are still
     counted in shares of it. A voxel is seen when some robot has measured it at least once. What can be seen
-    are the voxels of `World.visible`: all free ones that are connected with where robots can be, and the
-    solid ones beside them. In a plan that is exact for bodies that fit into a voxel, with a sensor that
-    updates one voxel behind a hit. Elsewhere some of them may lie where no ray gets to from where robots can
-    be: then a share of 1 is never reached. Nobody acts on it: the mission keeps the joint map for it
+    are those voxels of `World.visible`, the free ones that are connected with where robots can be and the
+    solid ones beside them, that are in line of sight and range of a place that a body of the team can reach
+    from its
+    start: behind a gap too narrow for bodies only what beams through it reach (`worlds.sight.visible_from`).
+    Nobody acts on it: the mission keeps the joint map for it
     (`Scenario.track_truth`).
 
     Attributes:

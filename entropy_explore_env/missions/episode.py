@@ -22,6 +22,7 @@ from entropy_explore_env.scenario import Scenario
 from entropy_explore_env.settings import gaussian_entropy_bits
 from entropy_explore_env.worlds.given import world_in_turn
 from entropy_explore_env.worlds.load import make_world, require_unchanged
+from entropy_explore_env.worlds.sight import visible_from
 from entropy_explore_env.worlds.splits import draw_world_number
 from entropy_explore_env.worlds.world import World
 
@@ -107,7 +108,7 @@ def fill_start(scenario: Scenario, rules: Rules, state: MissionState, start: Sta
     state.pooled[mission] = fresh_sums(rules.cells)
     if scenario.track_truth:
         state.joint_mean[mission], state.joint_precision[mission] = PRIOR_MEAN, prior
-        _set_seen_goal(scenario, state, mission, world)
+        _set_seen_goal(scenario, state, mission, start)
     for field in ("reached_s", "seen_s", "seen_m"):
         state.missions[mission][field] = -1.0
     _set_entropies(scenario, state, mission, float(prior), world.visible_voxels(scenario))
@@ -128,10 +129,11 @@ def fill_start(scenario: Scenario, rules: Rules, state: MissionState, start: Sta
     state.fiducials[mission] = start.fiducials
 
 
-def _set_seen_goal(scenario: Scenario, state: MissionState, mission: int, world: World) -> None:
-    """What can be seen, and how much of it has to be where that ends the mission."""
-    clock, ending = state.missions[mission], scenario.ending
-    visible = world.visible(scenario)
+def _set_seen_goal(scenario: Scenario, state: MissionState, mission: int, start: Start) -> None:
+    """What can be seen, from places within reach where that ends the mission, and how much has to be."""
+    clock, ending, world = state.missions[mission], scenario.ending, start.world
+    by_seen = ending.seen_share is not None or ending.unseen_free_voxels is not None
+    visible = visible_from(world, scenario, start.poses) if by_seen else world.visible(scenario)
     state.visible[mission] = visible.ravel()
     clock["visible"], clock["visible_free"] = visible.sum(), (visible & ~world.occupied).sum()
     if ending.seen_share is not None:

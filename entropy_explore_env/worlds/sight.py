@@ -1,0 +1,127 @@
+"""What a team can see from places that its bodies reach: beams pass gaps that bodies do not."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from scipy import ndimage
+
+from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.worlds.components import connected_components
+from entropy_explore_env.worlds.world import Collision, World
+
+
+def visible_from(world: World, scenario: Scenario, poses: np.ndarray) -> np.ndarray:
+    """Return which voxels of `World.visible` some robot can see from a place that it can reach.
+
+    A free voxel is seen from a place if the line between their centres crosses free space only and is no
+    longer than the sensor's range; a solid one if free ones beside it are seen. Where every free voxel is
+    seen, that is `World.visible` itself.
+
+    Args:
+        world: The true world.
+        scenario: The task.
+        poses: (A, 5) poses where the robots start.
+
+    Returns:
+        (X, Y, Z) bool.
+    """
+    voxels = np.floor((poses[:, :3] - world.grid.origin_m) / world.grid.voxel_size_m).astype(np.int64)
+    voxels = np.clip(voxels, 0, np.array(world.grid.shape) - 1)
+    kinds = scenario.kinds
+    seen = [
+        _visible_to(world, scenario, kind, tuple(map(tuple, voxels[first :: len(kinds)].tolist())))
+        for first, kind in enumerate(kinds)
+    ]
+    return np.logical_or.reduce(seen)
+
+
+@lru_cache(maxsize=8)
+def _visible_to(
+    world: World, scenario: Scenario, kind: RobotKind, starts: tuple[tuple[int, int, int], ...]
+) -> np.ndarray:
+    """(X, Y, Z) bool, what robots of a kind can see that start in some voxels; not to be changed."""
+    layout = world.layout(scenario, kind)
+    fits = layout.collision_mask == Collision.NONE
+    layer = scenario.layer_of(kind.robot)
+    if layer is not None:
+        fits[:, :, :layer] = fits[:, :, layer + 1 :] = False
+    labels, _ = connected_components(fits)
+    own = {int(labels[x, y, z if layer is None else layer]) for x, y, z in starts} - {0}
+    reached = np.isin(labels, list(own))
+    free = np.logical_not(world.occupied)
+    seen = layout.visible & free
+    left = np.argwhere(seen & ~reached)
+    places = reached & ~np.asarray(ndimage.binary_erosion(reached), np.bool_)
+    range_m = min(kind.sensor.max_range_m, float(np.linalg.norm(world.grid.size_m)))
+    found = np.zeros(len(left), np.bool_)
+    _look(left, places, free, _steps(range_m / world.grid.voxel_size_m, world.grid.flat), found)
+    if found.all():
+        return layout.visible
+    seen[tuple(left[~found].T)] = False
+    if not kind.sensor.voxels_behind:
+        return seen
+    within = None if world.unreadable is None else ~world.unreadable
+    behind = ndimage.binary_dilation(seen, iterations=kind.sensor.voxels_behind, mask=within)
+    return layout.visible & (seen | (np.asarray(behind, np.bool_) & world.occupied))
+
+
+@lru_cache(maxsize=8)
+def _steps(range_: float, flat: bool) -> np.ndarray:
+    """(N, 3) int16, all steps of voxels that are at most so long, the shortest first."""
+    reach = math.floor(range_ + 1e-9)
+    along = np.arange(-reach, reach + 1)
+    steps = np.stack(np.meshgrid(along, along, [0] if flat else along, indexing="ij"), axis=-1).reshape(-1, 3)
+    squared = (steps.astype(np.int64) ** 2).sum(axis=1)
+    order = np.argsort(squared, kind="stable")
+    return steps[order[squared[order] <= range_**2 + 1e-9]].astype(np.int16)
+
+
+@lean_kernel
+def _look(left, places, free, steps, found):
+    """Note which voxels can be seen from some place.
+
+    Args:
+        left: (N, 3) int64, the voxels.
+        places: (X, Y, Z) bool, where sensors can be.
+        free: (X, Y, Z) bool.
+        steps: (M, 3) int16, from a voxel to places within range, the nearest first.
+        found: (N,) bool; filled.
+    """
+    for n in range(len(left)):
+        for m in range(len(steps)):
+            x, y, z = left[n, 0] + steps[m, 0], left[n, 1] + steps[m, 1], left[n, 2] + steps[m, 2]
+            if not (0 <= x < free.shape[0] and 0 <= y < free.shape[1] and 0 <= z < free.shape[2]):
+                continue
+            if places[x, y, z] and _is_open(free, left[n], steps[m]):
+                found[n] = True
+                break
+
+
+@lean_kernel
+def _is_open(free, start, step):
+    """Whether the line from a voxel's centre to that of the voxel a step (3,) away crosses free voxels only.
+
+    Crossing times of the faces along axis i are (2 k + 1)/(2 |step_i|), k = 0, 1, …; they are compared as
+    whole numbers, and faces that are crossed together are crossed at once.
+    """
+    a, b, c = abs(np.int64(step[0])), abs(np.int64(step[1])), abs(np.int64(step[2]))
+    i = j = k = np.int64(0)
+    while i < a or j < b or k < c:
+        tx = (2 * i + 1) * max(b, 1) * max(c, 1) if i < a else np.int64(1 << 62)
+        ty = (2 * j + 1) * max(a, 1) * max(c, 1) if j < b else np.int64(1 << 62)
+        tz = (2 * k + 1) * max(a, 1) * max(b, 1) if k < c else np.int64(1 << 62)
+        first = min(tx, ty, tz)
+        i += np.int64(tx == first)
+        j += np.int64(ty == first)
+        k += np.int64(tz == first)
+        x = start[0] + (i if step[0] > 0 else -i)
+        y = start[1] + (j if step[1] > 0 else -j)
+        z = start[2] + (k if step[2] > 0 else -k)
+        if not free[x, y, z]:
+            return False
+    return True
