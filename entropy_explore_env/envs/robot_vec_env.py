@@ -284,8 +284,12 @@ class RobotVecEnv(VecEnv):
             AttributeError: They have none of this name, as Stable-Baselines3 has it.
         """
         check_instance("attr_name", attr_name, str)
-        value = None if attr_name == "render_mode" else getattr(self.vector_env, attr_name)
+        value = getattr(self.vector_env, attr_name)
         return [value for _ in self._get_indices(indices)]
+
+    def get_images(self) -> list[Any]:
+        """A picture of each mission, (480, 640, 3) uint8, for `render_mode="rgb_array"`."""
+        return list(self.vector_env.render()) if self.vector_env.render_mode == "rgb_array" else []
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:  # noqa: ANN401
         """Rows share their missions: none has attributes of its own.

@@ -137,14 +137,24 @@ class Window:
         self.dismissed = False
 
     def show(self, rgb: np.ndarray) -> None:
-        """Show a picture (H, W, 3) uint8 at once; the window takes its size."""
+        """Show a picture (H, W, 3) uint8 at once; the window takes its size.
+
+        Raises:
+            SettingError: There is no display.
+        """
         if self.dismissed:
             return
         pygame, size = self._pygame, (rgb.shape[1], rgb.shape[0])
         if self._screen is None or self._screen.get_size() != size:
-            pygame.display.init()
-            pygame.display.set_caption(self._title)
-            self._screen = pygame.display.set_mode(size)
+            try:
+                pygame.display.init()
+                pygame.display.set_caption(self._title)
+                self._screen = pygame.display.set_mode(size)
+            except pygame.error as error:
+                allowed = (
+                    f'"rgb_array" where there is no display ({error}; SDL_VIDEODRIVER=dummy draws nowhere)'
+                )
+                raise SettingError("render_mode", "human", allowed) from None
             self._clock = self._clock or pygame.time.Clock()
         self._screen.blit(pygame.image.frombuffer(np.ascontiguousarray(rgb), size, "RGB"), (0, 0))
         pygame.display.flip()

@@ -225,3 +225,16 @@ def test_rows_have_no_attributes_of_their_own() -> None:
     with pytest.raises(SettingError, match="no methods"):
         rows.env_method("reset")
     rows.close()
+
+
+def test_pictures_of_all_missions_are_rendered():
+    rows = RobotVecEnv("box-7x11x5", 2, robots=2, render_mode="rgb_array")
+    rows.reset()
+    assert rows.render_mode == "rgb_array"
+    assert [image.shape for image in rows.get_images()] == [(480, 640, 3)] * 2
+    picture = rows.render()
+    assert picture is not None and picture.shape == (960, 640, 3)
+    rows.close()
+    plain = RobotVecEnv("box-7x11x5", 1, robots=2)
+    assert plain.render_mode is None and plain.get_images() == []
+    plain.close()

@@ -278,6 +278,12 @@ def test_window_shows_pictures_and_a_person_can_close_it(monkeypatch: pytest.Mon
     assert not pygame.display.get_init()
 
 
+def test_without_a_display_one_line_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "none of this name")
+    with pytest.raises(SettingError, match=r"render_mode = 'human': .*\"rgb_array\" .*SDL_VIDEODRIVER=dummy"):
+        Window().show(np.zeros((40, 60, 3), np.uint8))
+
+
 def test_window_holds_its_frame_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
     window, picture = Window(frames_per_s=50.0), np.zeros((40, 60, 3), np.uint8)
