@@ -245,8 +245,8 @@ def _distance_claims(records: Records, part: str, name: str) -> list[Claim]:
         compared(records, part, "ptv", f"beta-{best}", what) for what in ("scans", "distance_m")
     )
     alike = scans.low > 1.0 - _ALIKE and scans.high < 1.0 + _ALIKE
-    text = f"{name}: V/t scans from nearly as many points as the best β ({best}); ratio"
-    shorter = f"{name}: ways of V/t are shorter than those of the best β ({best}); ratio"
+    text = f"{name}, to no frontier: V/t scans from nearly as many points as the best β ({best}); ratio"
+    shorter = f"{name}, to no frontier: ways of V/t are shorter than those of the best β ({best}); ratio"
     return [
         Claim(f"{part}-points", text, "about 1", *scans, alike),
         _faster(f"{part}-ways", shorter, "< 1", lengths),
