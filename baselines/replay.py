@@ -35,7 +35,7 @@ from entropy_explore_env.reports.mission_record import (
 from entropy_explore_env.version import VERSION
 
 _DIFFERS = 1
-_OWN = ("world", "read_memory_mib")
+_OWN = ("world", "world_file", "read_memory_mib")
 """Options that a task has, too, and that change no setting here."""
 _OF_A_MISSION = ("robots", "seed", "strategy", "scenario")
 

@@ -74,9 +74,11 @@ class Page:
             undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True, autoescape=False
         )
         try:
-            return environment.from_string(self.template.read_text("utf-8")).render(given)
+            template = self.template.read_text("utf-8")
         except OSError as error:
             raise SettingError("template", str(self.template), f"a file ({error.strerror})") from None
+        try:
+            return environment.from_string(template).render(given)
         except jinja2.TemplateSyntaxError as error:
             place = f"{self.template.name}, line {error.lineno}"
             raise SettingError("template", place, f"one of Jinja2 ({error.message})") from None

@@ -151,11 +151,17 @@ class GrowingTable:
                 os.truncate(self._path, whole)
 
     def append(self, row: Row) -> None:
-        """Add a row, in one write."""
+        """Add a row, in one write; where the disk is full, nothing of it stays."""
         descriptor = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+        before = os.fstat(descriptor).st_size
         try:
-            os.write(descriptor, f"{row.line()}\n".encode())
+            rest = f"{row.line()}\n".encode()
+            while rest:
+                rest = rest[os.write(descriptor, rest) :]
             os.fsync(descriptor)
+        except OSError:
+            os.ftruncate(descriptor, before)
+            raise
         finally:
             os.close(descriptor)
 

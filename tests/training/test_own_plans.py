@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from baselines.cli.arguments import run_command
+from baselines.experiments.rows import read_table
 from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX
@@ -66,8 +67,8 @@ def test_a_policy_learns_in_plans_and_is_tested_in_others(plans, tmp_path, capsy
     test += ["--world", str(plans["test"]), "--time-limit-s", "20"]
     assert run_command(evaluate.main, test) == 0
     assert [row["strategy"] for row in json.loads(capsys.readouterr().out)["rows"]] == [str(run), "random"]
-    missions = [json.loads(file.read_text())["record"] for file in (tmp_path / "missions").rglob("seed-*")]
-    assert len(missions) == 4 and {mission["world"] for mission in missions} == {"test"}
+    missions = read_table(tmp_path / "missions" / "missions.jsonl")
+    assert len(missions) == 4 and {mission.record["world"] for mission in missions} == {"test"}
     plans["a/plan"].write_bytes(plans["b/plan"].read_bytes())
     assert run_command(ppo.main, ["--resume", str(run), "--total-steps", "64"]) == BAD_INPUT
     assert f"error: world = '{plans['a/plan']}': allowed is the file that" in capsys.readouterr().err

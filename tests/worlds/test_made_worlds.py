@@ -50,7 +50,7 @@ def test_an_empty_world_is_shared_by_all_missions():
     assert make_world(BOX, rng(0)).grid == BOX.grid
 
 
-@pytest.mark.parametrize("name", ["castle", "castle.las", "", "octomap"])
+@pytest.mark.parametrize("name", ["castle", "castle.xyzzy", "", "octomap"])
 def test_a_world_that_nobody_knows_is_refused(name):
     scenario = free_box(world=name)
     for ask in (lambda: make_world(scenario, rng(0)), lambda: with_world(scenario)):
