@@ -184,8 +184,8 @@ class FrontierMap(ABC):
         """Count the points that rays from (3,), grid units, meet: their number, and weight."""
 
     @abstractmethod
-    def _rays_ahead(self, view: RobotKnowledge, yaw: float, pitch: float) -> np.ndarray:
-        """Return the rays of one gaze."""
+    def _rays_ahead(self, view: RobotKnowledge, gazes: np.ndarray) -> Sequence[np.ndarray]:
+        """Return the rays of each of (G, 2) gazes, yaw and pitch."""
 
     @abstractmethod
     def _count_ball(self, place: np.ndarray, marking: bool) -> tuple[int, float]:
@@ -291,7 +291,8 @@ class FrontierMap(ABC):
         ]
         if len(gazes) == 1:
             return gazes[0]
-        seen = [self._count_rays(place, self._rays_ahead(view, *gaze), marking=False)[0] for gaze in gazes]
+        fans = self._rays_ahead(view, np.array(gazes))
+        seen = [self._count_rays(place, rays, marking=False)[0] for rays in fans]
         yaw, pitch = gazes[int(np.argmax(seen))]
         return (yaw + math.pi) % _TURN - math.pi, pitch
 

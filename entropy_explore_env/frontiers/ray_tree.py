@@ -71,10 +71,12 @@ def rays_around(reach: float, pitches: np.ndarray) -> np.ndarray:
 
 
 def rays_towards(yaws: np.ndarray, pitches: np.ndarray) -> np.ndarray:
-    """Return (D, 3) float64 unit vectors of all pairs of yaw and pitch, radians."""
-    yaw, pitch = (axis.reshape(-1) for axis in np.meshgrid(yaws, pitches, indexing="ij"))
+    """Return (…, D, 3) float64 unit vectors of all pairs of (…, N) yaws and (…, M) pitches, radians."""
+    yaw, pitch = yaws[..., :, np.newaxis], pitches[..., np.newaxis, :]
     level = np.cos(pitch)
-    return np.stack([np.cos(yaw) * level, np.sin(yaw) * level, -np.sin(pitch)], axis=-1)
+    axes = np.broadcast_arrays(np.cos(yaw) * level, np.sin(yaw) * level, -np.sin(pitch))
+    rays = np.stack(axes, axis=-1)
+    return rays.reshape(*rays.shape[:-3], -1, 3)
 
 
 def grow_tree(directions: np.ndarray, reach: float, size: tuple[int, int, int]) -> RayTree:

@@ -6,6 +6,7 @@ Counts are reused as long as nothing changes within range.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from scipy import ndimage
@@ -131,10 +132,10 @@ class TerrainFrontiers(FrontierMap):
         """See `FrontierMap`; rays are (D, 2) unit vectors over the ground."""
         return count_below(self._counter, self._map, *self._from(place), rays, self._model, marking)
 
-    def _rays_ahead(self, view: RobotKnowledge, yaw: float, pitch: float) -> np.ndarray:
+    def _rays_ahead(self, view: RobotKnowledge, gazes: np.ndarray) -> Sequence[np.ndarray]:
         """See `FrontierMap`."""
-        half_turn = 0.5 * view.kind.sensor.field_of_view_rad[0]
-        return self._rays[self._rays @ (math.cos(yaw), math.sin(yaw)) >= math.cos(half_turn)]
+        least = math.cos(0.5 * view.kind.sensor.field_of_view_rad[0])
+        return [self._rays[self._rays @ (math.cos(yaw), math.sin(yaw)) >= least] for yaw in gazes[:, 0]]
 
     def _count_ball(self, place: np.ndarray, marking: bool) -> tuple[int, float]:
         """See `FrontierMap`."""

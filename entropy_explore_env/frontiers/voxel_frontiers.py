@@ -10,7 +10,7 @@ all of it in `listed`, the one with the shortest path in `nearest_of_blocks`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -118,11 +118,14 @@ class VoxelFrontiers(FrontierMap):
         arrays, start = (self._counter, self._states.state, self._size), tuple(place.tolist())
         return count_crossed(*arrays, start, rays, self.reach, marking)
 
-    def _rays_ahead(self, view: RobotKnowledge, yaw: float, pitch: float) -> np.ndarray:
+    def _rays_ahead(self, view: RobotKnowledge, gazes: np.ndarray) -> Sequence[np.ndarray]:
         """See `FrontierMap`."""
-        turn, tilt = view.kind.sensor.field_of_view_rad
-        pitches = self._pitches if view.planar else np.linspace(pitch - tilt / 2, pitch + tilt / 2, 5)
-        return rays_towards(np.linspace(yaw - turn / 2, yaw + turn / 2, 24), pitches)
+        half_turn, half_tilt = 0.5 * np.array(view.kind.sensor.field_of_view_rad)
+        yaws = np.linspace(gazes[:, 0] - half_turn, gazes[:, 0] + half_turn, 24, axis=-1)
+        if view.planar:
+            return list(rays_towards(yaws, self._pitches))
+        pitches = np.linspace(gazes[:, 1] - half_tilt, gazes[:, 1] + half_tilt, 5, axis=-1)
+        return list(rays_towards(yaws, pitches))
 
     def _count_ball(self, place: np.ndarray, marking: bool) -> tuple[int, float]:
         """See `FrontierMap`."""
