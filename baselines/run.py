@@ -2,11 +2,13 @@
 
 Shows a progress bar and a table; with `--out DIR` writes `mission.json` (the figures and time
 series), `mission.png` (curves and maps), `mission.gif` (the mission as it went) and `mission.npz`
-(its record, for `python -m baselines.replay`).
+(its record, for `python -m baselines.replay`). Ctrl-C ends the mission after the step under way:
+the same is shown and written of what was done, and the exit code is 130.
 """
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import sys
 from collections.abc import Sequence
@@ -15,12 +17,14 @@ from pathlib import Path
 from typing import Annotated
 
 from baselines.cli.arguments import INLINE, OmitArgPrefixes, Positional, option_help, parse, run_command
+from baselines.cli.interruption import Interruption
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
 from baselines.cli.progress import progress_bar
 from baselines.cli.task_options import TaskOptions, base_task, parsed_for, tasked
 from baselines.experiments.mission import run_mission, scripted_env
 from baselines.strategies import make_strategy, resolved
 from baselines.strategies.table import help_text
+from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.validation import check_whole
 
@@ -29,6 +33,12 @@ _STRATEGY = f"""Chooses viewpoints. We recommend best, which is {resolved("best"
 A learned policy: pretrained:room, the folder of a run of training,
 or the planner with weights of your own: weights.json.
 Your own: my_package.my_module:MyStrategy, path/to/file.py:MyStrategy."""
+
+_PROMISE = "the mission ends after this step, and what was done is shown and written"
+
+
+class _MissionInterrupted(Exception):
+    """Ends a mission between two steps."""
 
 
 @dataclass
@@ -67,14 +77,20 @@ def main(words: Sequence[str]) -> int:
         def after_step(env: EntropyExploreEnv) -> None:
             log.note(env)
             show(env)
+            if interruption.asked and env.agents:
+                raise _MissionInterrupted
 
-        run_mission(env, strategy, args.seed, after_step, log.command)
+        with Interruption(_PROMISE) as interruption, contextlib.suppress(_MissionInterrupted):
+            run_mission(env, strategy, args.seed, after_step, log.command)
         figures, written = log.finish(name)
     if args.task.world and env.scenario.grid.flat and not task.scenario.grid.flat:
         plan = f"{args.task.world[0]} is one voxel high: robots stayed in its plane and looked level"
         print(f"{plan} (--height-m makes it 3-D; office has ground robots)", file=sys.stderr)
     show_results(env, figures, written, args.output.json)
-    return 0
+    if not env.agents:
+        return 0
+    print(f"interrupted after {figures['t_mission_s']:,.1f} s of the mission", file=sys.stderr)
+    return INTERRUPTED
 
 
 if __name__ == "__main__":

@@ -34,6 +34,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
 from baselines.cli.arguments import INLINE, WholeNumber, make_folder, parse, print_json, run_command
+from baselines.cli.interruption import Interruption
 from baselines.cli.task_options import (
     TaskOptions,
     absolute_files,
@@ -69,7 +70,7 @@ from training.policy import (
     panorama_form,
     settings_of_policy,
 )
-from training.progress import Interruption, MissionFigures, Progress, TrainingBar
+from training.progress import MissionFigures, Progress, TrainingBar
 from training.runs import (
     TrainingState,
     check_finite,

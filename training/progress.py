@@ -1,16 +1,14 @@
-"""What a person sees and does of a run: progress, curve, TensorBoard, the terminal, and Ctrl-C."""
+"""What a person sees and does of a run: progress, curve, TensorBoard, and the terminal."""
 
 from __future__ import annotations
 
 import dataclasses
-import signal
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from types import FrameType, TracebackType
+from types import TracebackType
 from typing import Any, Literal
 
 import numpy as np
@@ -22,44 +20,6 @@ from stable_baselines3.common.callbacks import BaseCallback
 from baselines.experiments.tables import csv_table
 from training.advantages import DecisionBuffer
 from training.validation import Validation
-
-
-class Interruption:
-    """Notes a first Ctrl-C (SIGINT); used as a context, and only in the main thread it catches any.
-
-    Attributes:
-        asked: Whether there was one.
-    """
-
-    def __init__(self, promise: str) -> None:
-        """Take what is said at the first Ctrl-C: what will be done before the end."""
-        self.asked = False
-        self._promise = promise
-
-    def __enter__(self) -> Interruption:
-        self._catches = threading.current_thread() is threading.main_thread()
-        if self._catches:
-            self._before = signal.signal(signal.SIGINT, self._note)
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._catches:
-            signal.signal(signal.SIGINT, self._before)
-
-    def _note(self, number: int, frame: FrameType | None) -> None:
-        """Take the signal.
-
-        Raises:
-            KeyboardInterrupt: It is not the first one.
-        """
-        del number, frame
-        if self.asked:
-            raise KeyboardInterrupt
-        self.asked = True
-        print(f"interrupted: {self._promise}; Ctrl-C again ends at once", file=sys.stderr, flush=True)
-
 
 _FIGURES = ("t_mission_s", "finished", "bits_gained_per_bit_sent", "overlap", "scans")
 """Figures of missions that TensorBoard shows."""

@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from baselines.cli.arguments import INLINE, WholeNumber, make_folder, parse, run_command
+from baselines.cli.interruption import Interruption
 from baselines.cli.task_options import (
     TaskOptions,
     base_task,
@@ -40,7 +41,6 @@ from training import extra  # noqa: F401 - before what is not there without it
 from training.advantages import DiscountUnit
 from training.checkpoints import NotFiniteError, SilentRunnersError
 from training.ppo import OWN
-from training.progress import Interruption
 from training.rllib_run import (
     FIGURES,
     POLICY,

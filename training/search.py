@@ -35,6 +35,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
+from baselines.cli.interruption import Interruption
 from baselines.cli.worker_options import WorkerOptions
 from baselines.experiments.mission import run_mission, scripted_env
 from baselines.experiments.ray_cluster import RayCluster
@@ -53,7 +54,6 @@ from entropy_explore_env.validation import check_whole, is_number
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.writing import write_atomically
 from training.evaluate import task_of  # which says what is missing without the extra
-from training.progress import Interruption
 from training.validation import pair_seeds
 
 SEARCHED = (

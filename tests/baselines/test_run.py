@@ -556,9 +556,9 @@ ENDLESS = ("--ending.sigma-end", "0.0002", "--ending.time-limit-s", "inf")
 
 
 @needs_posix
-def test_an_interrupted_process_ends_with_130_and_leaves_nothing(tmp_path):
+def test_an_interrupted_process_writes_what_was_done_and_ends_with_130(tmp_path):
     """The mission would go on for hours; it is interrupted as soon as its progress bar is seen."""
-    words = ("box-7x11x5", *ENDLESS, "--out", str(tmp_path / "out"))
+    words = ("box-7x11x5", *ENDLESS, "--out", str(tmp_path))
     with process(*words, FORCE_COLOR="1", TERM="xterm") as started:
         assert started.stderr is not None
         shown = started.stderr.read(40)
@@ -568,9 +568,13 @@ def test_an_interrupted_process_ends_with_130_and_leaves_nothing(tmp_path):
             out, err = started.communicate(timeout=60)
         finally:
             started.kill()
-    assert (started.returncode, out) == (130, "")
-    assert err.endswith("interrupted\n") and "Traceback" not in shown + err
-    assert [path for path in tmp_path.rglob("*") if path.is_file()] == []
+    assert started.returncode == 130 and "Traceback" not in shown + err
+    figures = json.loads((tmp_path / "mission.json").read_text())
+    assert figures["end_reason"] == "RUNNING" and "RUNNING" in out
+    assert figures["t_mission_s"] > 0.0 and not figures["finished"]
+    assert err.endswith(f"interrupted after {figures['t_mission_s']:,.1f} s of the mission\n")
+    assert sorted(path.name for path in tmp_path.iterdir()) == FILES
+    assert run_command(replay.main, [str(tmp_path / "mission.npz"), "--json"]) == 0  # the same end, again
 
 
 def test_the_mission_s_end_is_said_by_its_name():

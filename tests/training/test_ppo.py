@@ -20,6 +20,7 @@ import pytest
 import torch
 from gymnasium import spaces
 
+from baselines.cli.interruption import Interruption
 from baselines.experiments.mission import Surroundings
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
@@ -28,7 +29,6 @@ from tests.systems import needs_posix
 from training import ppo
 from training.advantages import DecisionBuffer
 from training.checkpoints import NotFiniteError, checkpoint_name, latest_checkpoint, load_checkpoint
-from training.progress import Interruption
 from training.validation import Validator
 
 ROOT = Path(__file__).parents[2]

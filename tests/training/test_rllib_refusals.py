@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 from baselines.cli.arguments import run_command
+from baselines.cli.interruption import Interruption
 from entropy_explore_env.command import INTERRUPTED
 from training import rllib_ppo, runs
 from training.checkpoints import NotFiniteError, SilentRunnersError
-from training.progress import Interruption
 from training.rllib_ppo import Args, last_checkpoint, main
 from training.validation import Validation
 
