@@ -8,10 +8,23 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from entropy_explore_env.errors import ActionError
+from entropy_explore_env.errors import ActionError, SettingError
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.validation import is_whole
 
 _ROUNDING = 1e-6
+
+
+def masks_of(missions: Missions) -> np.ndarray:
+    """Return (E, A, N) bool: which actions by number make sense by each robot's own belief.
+
+    Raises:
+        SettingError: Actions are no numbers.
+    """
+    action = missions.scenario.action
+    if not action.by_number:
+        raise SettingError("Action.kind", action.kind, "discrete or candidates: other actions have no masks")
+    return missions.action_masks() == 1
 
 
 class ActionChecker:

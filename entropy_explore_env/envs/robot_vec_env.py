@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium.vector import AutoresetMode
 
-from entropy_explore_env.envs.checks import as_array
+from entropy_explore_env.envs.checks import as_array, masks_of
 from entropy_explore_env.envs.infos import end_figures
 from entropy_explore_env.envs.rewards import RewardFunction
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
@@ -277,6 +277,15 @@ class RobotVecEnv(VecEnv):
         """End the threads."""
         self.vector_env.close()
 
+    def action_masks(self) -> np.ndarray:
+        """Return (N, K) bool, which of K actions by number make sense now; MaskablePPO asks for it.
+
+        Raises:
+            SettingError: Actions are no numbers.
+        """
+        masks = masks_of(self.vector_env.missions)
+        return masks.reshape(self.num_envs, masks.shape[-1])
+
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:  # noqa: ANN401 - SB3's signature
         """An attribute of the missions, once for each row asked for.
 
@@ -284,7 +293,8 @@ class RobotVecEnv(VecEnv):
             AttributeError: They have none of this name, as Stable-Baselines3 has it.
         """
         check_instance("attr_name", attr_name, str)
-        value = getattr(self.vector_env, attr_name)
+        masked = attr_name == "action_masks" and self.scenario.action.by_number
+        value = self.action_masks if masked else getattr(self.vector_env, attr_name)
         return [value for _ in self._get_indices(indices)]
 
     def get_images(self) -> list[Any]:
@@ -306,12 +316,18 @@ class RobotVecEnv(VecEnv):
         indices: Any = None,  # noqa: ANN401
         **kwargs: Any,  # noqa: ANN401
     ) -> list[Any]:
-        """Rows share their missions: none has methods of its own.
+        """Return what `action_masks` gives, row by row; rows have no other method of their own.
 
         Raises:
-            SettingError: Always.
+            SettingError: It is another method, or actions are no numbers.
         """
-        raise SettingError("env_method", method_name, "nothing: rows have no methods of their own")
+        check_instance("method_name", method_name, str)
+        if method_name != "action_masks":
+            raise SettingError(
+                "env_method", method_name, "action_masks: rows have no other methods of their own"
+            )
+        masks = self.action_masks()
+        return [masks[row] for row in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:  # noqa: ANN401
         """No row is wrapped."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 import numpy as np
 
-from entropy_explore_env.envs.checks import ActionChecker
+from entropy_explore_env.envs.checks import ActionChecker, masks_of
 from entropy_explore_env.envs.infos import robot_infos
 from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
 from entropy_explore_env.errors import CallOrderError, SettingError
@@ -109,6 +109,14 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
 
     def _observation(self) -> np.ndarray | dict[str, np.ndarray]:
         return self.missions.layout.split(self.missions.observations[0, 0].copy())
+
+    def action_masks(self) -> np.ndarray:
+        """Return (N,) bool, which actions by number make sense now; MaskablePPO of sb3-contrib asks for it.
+
+        Raises:
+            SettingError: Actions are no numbers.
+        """
+        return masks_of(self.missions)[0, 0]
 
     def view(self) -> RobotView:
         """What the robot knows; strategies see this and nothing else."""

@@ -222,9 +222,30 @@ def test_rows_have_no_attributes_of_their_own() -> None:
     assert rows.env_is_wrapped(object) == [False] * rows.num_envs
     with pytest.raises(SettingError, match="no attributes"):
         rows.set_attr("num_envs", 3)
-    with pytest.raises(SettingError, match="no methods"):
+    with pytest.raises(SettingError, match="no other methods"):
         rows.env_method("reset")
     rows.close()
+
+
+@pytest.mark.parametrize("action", [Action("discrete", moves="axes"), Action("candidates", candidates=5)])
+def test_rows_have_the_masks_of_their_robots(action) -> None:
+    rows = made(action=action)
+    rows.reset()
+    rng = np.random.default_rng(0)
+    for _ in range(12):
+        masks = rows.env_method("action_masks")
+        wanted = rows.vector_env.missions.action_masks().reshape(rows.num_envs, -1) == 1
+        assert np.array_equal(masks, wanted) and np.array_equal(rows.action_masks(), wanted)
+        assert np.array_equal(rows.env_method("action_masks", indices=[4, 1]), wanted[[4, 1]])
+        rows.step((wanted * rng.random(wanted.shape)).argmax(1))
+    assert rows.has_attr("action_masks")
+
+
+def test_rows_whose_actions_are_no_numbers_have_no_masks() -> None:
+    rows = made(action=Action())
+    assert not rows.has_attr("action_masks")
+    with pytest.raises(SettingError, match=r"Action\.kind = 'continuous'"):
+        rows.env_method("action_masks")
 
 
 def test_pictures_of_all_missions_are_rendered():

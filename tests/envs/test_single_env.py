@@ -173,3 +173,18 @@ def test_gymnasium_s_wrappers_find_what_they_need() -> None:
         rewards.append(float(reward))
     assert truncated and info["episode"]["l"] == 10
     assert info["episode"]["r"] == pytest.approx(sum(rewards))
+
+
+@pytest.mark.parametrize("kind", ["discrete", "candidates"])
+def test_masks_are_those_of_infos_through_wrappers(kind):
+    env = gymnasium.make(environment_id(BOX), action={"kind": kind})
+    _, info = env.reset(seed=3)
+    for _ in range(5):
+        masks = env.get_wrapper_attr("action_masks")()
+        assert masks.dtype == bool and np.array_equal(masks, info["action_mask"] == 1)
+        _, _, _, _, info = env.step(int(np.flatnonzero(masks)[-1]))
+
+
+def test_continuous_actions_have_no_masks():
+    with pytest.raises(SettingError, match=r"Action\.kind = 'continuous'"):
+        SingleRobotEnv(BOX).action_masks()
