@@ -169,12 +169,6 @@ def mission_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
     return record_mission(env, make_strategy(strategy), seed)
 
 
-def figures_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
-    """Run a mission of the strategy with this name, and record its figures alone."""
-    run_mission(env, make_strategy(strategy), seed)
-    return mission_figures(env.missions, 0)
-
-
 def record_mission(
     env: EntropyExploreEnv,
     strategy: Strategy,

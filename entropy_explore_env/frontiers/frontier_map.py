@@ -9,11 +9,11 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
-from entropy_explore_env.frontiers.blocks import COVERED, EDGE, EXCLUDED, NONE, UNMAPPED, Blocks, mark_around
+from entropy_explore_env.frontiers.blocks import EXCLUDED, NONE, UNMAPPED, Blocks, mark_around
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.frontiers.visibility import new_counter
 from entropy_explore_env.frontiers.voxel_states import VoxelStates
@@ -63,18 +63,6 @@ class FrontierConfig:
             check(self, "gamma", "None, or a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
 
 
-class Chart(NamedTuple):
-    """What a robot knows, seen from above, for pictures; (X, Y) bool, the ground float64."""
-
-    mapped: np.ndarray
-    covered: np.ndarray
-    """Walls; over terrain none."""
-    edge: np.ndarray
-    """Mapped beside unexplored."""
-    ground: np.ndarray
-    """Height of the ground above the floor in voxel edges; NaN = not mapped, or a plan."""
-
-
 class FrontierMap(ABC):
     """Candidates of one robot's belief, each in a slot, and V(height factor) of each in points.
 
@@ -110,7 +98,7 @@ class FrontierMap(ABC):
     def __init__(self, scenario: Scenario, kind: RobotKind, frontiers: FrontierConfig) -> None:
         """Take the settings; nothing is explored yet."""
         grid = scenario.grid
-        self._config, self._size, self._edge = frontiers, grid.shape, grid.voxel_size_m
+        self._size, self._edge = grid.shape, grid.voxel_size_m
         self._prior, self._naive = scenario.sigma_prior**-2, frontiers.visibility == "naive"
         self.reach = min(kind.sensor.max_range_m / self._edge, float(sum(grid.shape)))
         self._spacing = max(round((frontiers.spacing_m or self.reach * self._edge / 6.0) / self._edge), 1)
@@ -195,18 +183,6 @@ class FrontierMap(ABC):
         """Return the share of all points that are mapped."""
         return float((self._blocks.state & UNMAPPED == 0).mean())
 
-    def chart(self) -> Chart:
-        """Return what is known, seen from above; in 3-D the union over all heights."""
-        layer = self._blocks.layer
-        layers = slice(None) if layer < 0 else slice(layer, layer + 1)
-        state, flags = (
-            cells.reshape(*self._size[:2], -1)[:, :, layers]
-            for cells in (self._blocks.state, self._blocks.flags)
-        )
-        marks = state & UNMAPPED == 0, state & COVERED > 0, flags & EDGE > 0
-        mapped, covered, edge = (np.asarray(mark.any(2)) for mark in marks)
-        return Chart(mapped, covered, edge, np.full(self._size[:2], np.nan))
-
     def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
         """Return (K,) V·(height factor): points expected to be seen, weighted by promises."""
         self._bounds[slots], weighed = self._counted(voxels)
@@ -246,13 +222,6 @@ class FrontierMap(ABC):
         """Forget all promises."""
         if self._counter.promises[0] > 0:
             self._counter.promised[:] = self._counter.promises[:] = 0
-
-    def expected(self, place: np.ndarray) -> np.ndarray:
-        """Return (X, Y) bool, columns with points that are expected to be seen from (3,), grid units."""
-        self.promise(place)
-        found = (self._counter.promised > 0).reshape(*self._size[:2], -1).any(2)
-        self.release()
-        return np.asarray(found)
 
     def exclude(self, voxel: int) -> None:
         """Note that a scan was taken in a voxel: it is no candidate any more."""

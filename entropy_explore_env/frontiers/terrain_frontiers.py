@@ -12,7 +12,7 @@ import numpy as np
 from scipy import ndimage
 
 from entropy_explore_env.frontiers.blocks import NONE, UNEXPLORED, replace_unreached
-from entropy_explore_env.frontiers.frontier_map import BATCH_CELLS, Chart, FrontierConfig, FrontierMap
+from entropy_explore_env.frontiers.frontier_map import BATCH_CELLS, FrontierConfig, FrontierMap
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.frontiers.ray_tree import yaws_around
 from entropy_explore_env.frontiers.terrain_map import (
@@ -97,11 +97,6 @@ class TerrainFrontiers(FrontierMap):
         near = tiles_near(self._axes_of(opened), self._size, self.reach + self._model.patch)
         x, y, _ = (self._axes_of(self._voxels[slots]) // TILE).T
         self._bounds[slots[near[x, y]]] = math.inf
-
-    def chart(self) -> Chart:
-        """See `FrontierMap`."""
-        ground = self._map.ground
-        return super().chart()._replace(ground=np.where(ground != NONE, ground.astype(float), np.nan))
 
     def upper_bounds(self, slots: np.ndarray) -> np.ndarray:
         """See `FrontierMap`; where nothing is counted yet, by the unexplored columns in range."""

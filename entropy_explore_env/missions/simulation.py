@@ -169,10 +169,6 @@ class Missions:
         for start in drawn:
             self._begin(start)
 
-    def start_episode(self, mission: int, seed: int, episode: int, options: ResetOptions = DRAWN) -> None:
-        """Start a mission as an episode of a seed, without those before it; see `reset`."""
-        self.begin([self.draw_episode(mission, seed, episode, options)])
-
     def _episode(self, mission: int, seed: int | None) -> tuple[int, int]:
         """Seed and episode of a mission after a reset."""
         if seed is not None or self.episodes[mission] < 0:

@@ -19,7 +19,7 @@ from baselines.papers.sawhney.mission import MapRun, Run
 from baselines.papers.sawhney.terrain_model import JACKSBORO
 from baselines.strategies.metrics import Coordinated, ExplorationConfig, Metric, Nearest
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA, FrontierConfig
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.scenario import Scenario, with_settings
 from entropy_explore_env.scenarios import find_scenario
 
@@ -36,7 +36,6 @@ POINT = {"plans": 0.05, "terrains": 4.0}
 BONUS = {"plans": 0.5, "terrains": 40.0}
 """Of the finishing rule."""
 STRATEGY = "per-time-visibility"
-SIGMA = KNOWN_SIGMA
 TIME_LIMIT_S = 3600.0
 MAP_TEAM, MAP_STARTS = 3, 5
 MAP_METHODS = ("ptv", "beta-1", "beta-10", "beta-40", "finish", "nearest", "coordinated")
@@ -169,11 +168,6 @@ def experiment(amount: Amount) -> list[CellTrial]:
             exploring["frontiers"] = replace(frontiers, **change.frontiers)
             cells.append(_cell(world, CHANGED_TEAM, method, exploring, seeds, None, change.settings, name))
     return trials_of(cells)
-
-
-def world_cell(world: str, robots: int, method: str) -> Cell:
-    """Return a cell of one mission in a world, by a method of the experiment."""
-    return _cell(world, robots, method, methods(part_of(world), False)[method], 1, None)
 
 
 def _cell(
