@@ -21,7 +21,7 @@ from typing import Annotated
 from baselines.cli.arguments import INLINE, make_folder, parse, print_json, run_command, told_command
 from baselines.cli.task_options import TaskOptions, given_in, is_of_task, is_whole_scenario
 from baselines.cli.worker_options import TrialOptions
-from baselines.experiments.rows import read_table, write_table
+from baselines.experiments.rows import read_table
 from baselines.experiments.trials import run_trials
 from baselines.strategies import STRATEGIES, make_strategy, resolved
 from baselines.suites import find_suite, suite_strategies
@@ -107,8 +107,6 @@ def main(words: Sequence[str]) -> int:
     started = time.monotonic()
     table = runs / f"{suite.name}.jsonl"
     if stop_after_s > 0.0:
-        if known and not table.exists():
-            write_table(table, known)
         ran = run_trials(suite.trials, table, how, known)
         if suite.later is not None:
             suite = suite.completed(by_seed(row for row in ran if row is not None))

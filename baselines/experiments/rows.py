@@ -150,12 +150,12 @@ class GrowingTable:
             if whole < len(content):
                 os.truncate(self._path, whole)
 
-    def append(self, row: Row) -> None:
-        """Add a row, in one write; where the disk is full, nothing of it stays."""
+    def append(self, *rows: Row) -> None:
+        """Add rows, in one write; where the disk is full, nothing of them stays."""
         descriptor = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
         before = os.fstat(descriptor).st_size
         try:
-            rest = f"{row.line()}\n".encode()
+            rest = "".join(f"{row.line()}\n" for row in rows).encode()
             while rest:
                 rest = rest[os.write(descriptor, rest) :]
             os.fsync(descriptor)

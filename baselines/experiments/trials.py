@@ -124,10 +124,10 @@ def run_trials(trials: Sequence[Trial], table: Path, how: How, known: Sequence[R
     with grown.opened() as kept:
         rows = {row.key: row for row in kept}
         asked = set(keys)
-        for row in known:
-            if row.key in asked and row.key not in rows:
-                grown.append(row)
-                rows[row.key] = row
+        given = {row.key: row for row in known if row.key in asked and row.key not in rows}
+        if given:
+            grown.append(*given.values())
+            rows |= given
         wanted = [
             (key, trial)
             for key, trial in zip(keys, trials, strict=True)
