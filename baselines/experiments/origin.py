@@ -12,7 +12,7 @@ from pathlib import Path
 from entropy_explore_env.errors import SettingError
 
 _ROOT = Path(__file__).parents[2]
-_CODE = ("*.py", "*.toml", "training/pretrained")
+_CODE = ("*.py", "*.toml", "training/pretrained", "entropy_explore_env/planner/learned")
 """What has to be committed for a tree to be clean; pages and figures may differ."""
 _LIBRARIES = ("numpy", "numba", "scipy")
 _SHORT = 12
