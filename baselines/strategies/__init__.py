@@ -53,7 +53,7 @@ def make_strategy(name: str) -> Strategy:
 
 
 def scripted_maker(name: str) -> Callable[[], Strategy] | None:
-    """Return what makes the strategy of the package with this name; None = there is none.
+    """Return what makes the scripted strategy with this name, or None for an unknown name.
 
     Raises:
         SettingError: It names a file of planner weights that cannot be used.

@@ -28,7 +28,7 @@ def absurd_text(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 def absurd_binary(data: bytes, rng: np.random.Generator) -> bytes:
-    """Four bytes become a large number, in either order, or a float that is none."""
+    """Four bytes become a large number, in either order, or a float that is NaN or infinite."""
     values = (0xFFFFFFFF, 0x7FFFFFFF, 0x80000000, 1 << 24, 1 << 16, 0x7FC00000, 0x7F000000, 0)
     start = int(rng.integers(max(1, min(len(data), 4096) - 4)))
     word = struct.pack(("<I", ">I")[int(rng.integers(2))], values[int(rng.integers(len(values)))])

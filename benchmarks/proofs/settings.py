@@ -19,7 +19,7 @@ WATCHDOG_S = 20.0
 """Most processor time of a scenario's steps, without the compilation of kernels."""
 _MOST_DRAWS = 10_000
 _ALL_KERNELS_EVERY = 100
-"""One scenario of so many may observe anything; all of them would compile for hours."""
+"""Every hundredth scenario may observe anything: if all did, compiling would take hours."""
 
 
 def play(number: int) -> Found:

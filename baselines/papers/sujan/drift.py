@@ -196,7 +196,7 @@ def joint(records: Records, cell: str, field: str) -> np.ndarray:
 
 
 def error_m(records: Records, cell: str) -> np.ndarray:
-    """(N,) root mean square error of the place over each mission's scans; 0 where nobody drifts."""
+    """(N,) root mean square error of the place over each mission's scans; 0 where no robot drifts."""
     return np.asarray([record.get("localization", {}).get("rms_error_m", 0.0) for record in records[cell]])
 
 

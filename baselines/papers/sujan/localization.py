@@ -103,7 +103,7 @@ def cell_id(count: int, reach: str, weight: float = 0.0) -> str:
 
 
 def in_world(count: int, reach: str) -> int:
-    """How many fiducials a world has where so many are to be in a circle of the reach."""
+    """Return the number of fiducials in a world that has `count` of them within reach, on average."""
     return round(count * AREA_M2 / (math.pi * REACH_M[reach] ** 2))
 
 

@@ -33,7 +33,7 @@ def projected_centroid(cell: np.ndarray, density: np.ndarray, threshold: float) 
 
 
 def nearest_uncertain(cell: np.ndarray, costs: np.ndarray, density: np.ndarray, threshold: float) -> int:
-    """Return the voxel of a cell with φ ≥ τ that costs least to reach; UNREACHED where there is none."""
+    """Return the voxel of a cell with φ ≥ τ that costs least to reach; UNREACHED if no φ is ≥ τ."""
     among = cell[density.reshape(-1)[cell] >= threshold]
     return int(among[int(np.argmin(costs.reshape(-1)[among]))]) if len(among) else UNREACHED
 
