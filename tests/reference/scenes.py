@@ -128,3 +128,14 @@ def put(missions: Missions, robot: int, pose: Any, mission: int = 0) -> None:
 def build(missions: Missions, solid: np.ndarray, mission: int = 0) -> None:
     """Make these voxels, (X, Y, Z) bool, the truth; bodies are smaller than half a voxel."""
     missions.state.truth[mission] = solid.ravel()
+
+
+def build_known(missions: Missions, solid: np.ndarray, voxels: list[tuple[int, int, int]]) -> None:
+    """Make these voxels, (X, Y, Z) bool, the truth; robots stand in some voxels and know all of the world."""
+    build(missions, solid)
+    for robot, voxel in enumerate(voxels):
+        pose = np.zeros(5)
+        pose[:3] = missions.grid.centre_of(np.array(voxel))
+        put(missions, robot, pose)
+        missions.mean[0, robot][solid], missions.mean[0, robot][~solid] = 1.0, 0.0
+        missions.precision[0, robot] = 1e4

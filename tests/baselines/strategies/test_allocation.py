@@ -20,7 +20,7 @@ from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, find_scenario
 from entropy_explore_env.settings import Grid
 from tests.reference import sawhney as reference
-from tests.reference.scenes import build, free_box, put, started
+from tests.reference.scenes import build, build_known, free_box, put, started
 
 
 def corridor(places, heard=True):
@@ -30,16 +30,9 @@ def corridor(places, heard=True):
     )
     solid = np.ones(missions.grid.shape, bool)
     solid[3, :, 2] = False
-    build(missions, solid)
-    for robot, y in enumerate(places):
-        pose = np.zeros(5)
-        pose[:3] = missions.grid.centre_of(np.array([3, y, 2]))
-        put(missions, robot, pose)
-        missions.mean[0, robot][solid], missions.mean[0, robot][~solid] = 1.0, 0.0
-        missions.precision[0, robot] = 1e4
-        for y_unknown in (0, 1, 9, 10):
-            missions.mean[0, robot][3, y_unknown, 2] = 0.5
-            missions.precision[0, robot][3, y_unknown, 2] = 1e-3
+    build_known(missions, solid, [(3, y, 2) for y in places])
+    unknown = [0, 1, 9, 10]
+    missions.mean[0, :, 3, unknown, 2], missions.precision[0, :, 3, unknown, 2] = 0.5, 1e-3
     for robot in range(len(places)) if heard else ():
         for mate in range(len(places)):
             seen = missions.state.heard[0, robot, mate]

@@ -20,7 +20,7 @@ from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.scenario import with_settings
 from entropy_explore_env.scenarios import BOX, find_scenario
-from tests.reference.scenes import build, drawn, free_box, put, random_belief, seeds, started
+from tests.reference.scenes import build_known, drawn, free_box, random_belief, seeds, started
 
 NAMES = ("voronoi", "voronoi-gradient", "voronoi-nearest")
 
@@ -92,13 +92,7 @@ def corridor_missions(places):
     missions = started(free_box(robots=2, robot={"reach_m": 50.0}))
     solid = np.ones(missions.grid.shape, bool)
     solid[3, 1:10, 2] = False
-    build(missions, solid)
-    for robot, y in enumerate(places):
-        pose = np.zeros(5)
-        pose[:3] = missions.grid.centre_of(np.array([3, y, 2]))
-        put(missions, robot, pose)
-        missions.mean[0, robot][solid], missions.mean[0, robot][~solid] = 1.0, 0.0
-        missions.precision[0, robot] = 1e4
+    build_known(missions, solid, [(3, y, 2) for y in places])
     for robot in range(2):
         seen = missions.state.heard[0, robot, 1 - robot]
         seen["heard_s"], seen["pose"][:3] = 0.0, missions.state.robots[0, 1 - robot]["origin"][:3]
