@@ -29,7 +29,7 @@ from baselines.cli.worker_options import WorkerOptions
 from baselines.experiments.mission import Surroundings
 from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.rows import Record
-from baselines.experiments.statistics import median_interval, median_ratio_interval
+from baselines.experiments.statistics import Interval, median_interval, median_ratio_interval
 from baselines.experiments.trials import Cell, How, by_cell, run_cells
 from baselines.strategies import is_learned, make_strategy, resolved
 from entropy_explore_env.errors import SettingError, counted
@@ -274,8 +274,8 @@ def table_cells(row: dict[str, Any], seeds: int) -> list[str]:
     ]
     if "ratio" not in row:
         return [*cells, "", ""]
-    ratio = f"{row['ratio']:.2f} ({row['ratio_low']:.2f} … {row['ratio_high']:.2f})"
-    return [*cells, ratio, f"{row['faster']} of {seeds}"]
+    ratio = Interval(row["ratio"], row["ratio_low"], row["ratio_high"])
+    return [*cells, ratio.text(), f"{row['faster']} of {seeds}"]
 
 
 if __name__ == "__main__":

@@ -29,18 +29,24 @@ from entropy_explore_env.worlds.given import GIVEN, distinct_names
 
 DEFAULT_SCENARIOS, QUICK_SCENARIOS = "room,room-furnished,lab,office,cave", "room,office"
 MOST_ROBOTS = 1000
-_IMAGES = (".png", ".pgm", ".ppm", ".pnm", ".jpg", ".jpeg", ".bmp", ".gif")
-_PLANS = (".yaml", ".yml", *_IMAGES)
-_MESHES = (".obj", ".stl", ".glb", ".dae", ".ply")
-_CLOUDS = (".pcd", ".las", ".laz")
-_HEIGHTS = (".tif", ".tiff", ".npz", ".asc")
+
+
+def _read_by(*readers: str) -> tuple[str, ...]:
+    """Return the suffixes of the files that some readers of the library read."""
+    return tuple(suffix for suffix, form in FORMATS.items() if form.reader in readers)
+
+
+_IMAGES, _YAML = _read_by("images"), _read_by("map_server")
+_PLANS = (*_YAML, *_IMAGES)
+_MESHES, _CLOUDS = _read_by("meshes"), _read_by("point_clouds", "las")
+_HEIGHTS = _read_by("geotiff", "archives", "esri_grid")
 _READ_BY_SOME = {
     "height_m": _PLANS,
     "resolution_m": _IMAGES,
     "negate": _IMAGES,
     "occupied_below": _PLANS,
     "free_above": _PLANS,
-    "map_rule": (".yaml", ".yml"),
+    "map_rule": _YAML,
     "elevation_step_m": _IMAGES,
     "clearance_m": (*_HEIGHTS, *_MESHES),
     "ceiling_m": _HEIGHTS,
@@ -178,7 +184,7 @@ def world_files(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
     found = sorted(each for each in path.rglob("*") if each.suffix.lower() in FORMATS)
-    named = {each.with_suffix("") for each in found if each.suffix.lower() in _PLANS[:2]}
+    named = {each.with_suffix("") for each in found if each.suffix.lower() in _YAML}
     files = [
         each for each in found if each.suffix.lower() not in _IMAGES or each.with_suffix("") not in named
     ]

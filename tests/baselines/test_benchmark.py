@@ -378,6 +378,7 @@ def test_images_are_read_as_asked_and_files_that_say_it_themselves_are_not(folde
     with pytest.raises(SettingError, match=r"world = .*a folder with world files"):
         tasks_of("--world", str(folder / "empty" / ".."), "--world", str(ROOT / "requirements"))
     assert {*own._PLANS, *own._MESHES, *own._HEIGHTS} < set(FORMATS)
+    assert {*own._PLANS, *own._MESHES, *own._HEIGHTS, *own._CLOUDS, ".bt", ".ot"} == set(FORMATS)
 
 
 def test_several_scenarios_take_what_is_given_and_keep_the_rest():
