@@ -35,8 +35,8 @@ from baselines.suites.own import (
 from baselines.suites.results import by_seed, results_of
 from baselines.suites.suite import BASELINE, REFERENCE, Suite
 from entropy_explore_env.errors import SettingError, one_of
-from entropy_explore_env.scenarios import SCENARIOS
-from entropy_explore_env.validation import check_whole
+from entropy_explore_env.settings.scenarios import SCENARIOS
+from entropy_explore_env.settings.validation import check_whole
 
 _SEEDS, _QUICK_SEEDS = 30, 5
 _PINNED = ("scenarios", "robots", "seeds", "world_scenario")

@@ -21,9 +21,9 @@ from baselines.cli.worker_options import TrialOptions
 from baselines.experiments.rows import read_table
 from baselines.experiments.trials import run_trials
 from baselines.strategies import make_strategy, resolved
-from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.errors import MissingExtraError, SettingError
-from entropy_explore_env.validation import check_whole
+from entropy_explore_env.settings.observation import Observation
+from entropy_explore_env.settings.validation import check_whole
 
 ROWS = "_rows.jsonl"
 """Table in --out that says which files are whole; readers of Parquet pass by what begins with _."""

@@ -26,9 +26,10 @@ from entropy_explore_env.reports.animation import Film, animate
 from entropy_explore_env.reports.annotations import write
 from entropy_explore_env.reports.colours import PAPER
 from entropy_explore_env.reports.painting import Painter
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import SCENARIOS
-from entropy_explore_env.validation import check_whole
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import SCENARIOS
+from entropy_explore_env.settings.validation import check_whole
 
 _FRAME_S, _LAST = 0.15, 12
 """How long each picture is shown, and how often the last one."""

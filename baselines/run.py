@@ -26,7 +26,7 @@ from baselines.strategies import make_strategy, resolved
 from baselines.strategies.table import help_text
 from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.validation import check_whole
+from entropy_explore_env.settings.validation import check_whole
 
 _STRATEGY = f"""Chooses viewpoints. We recommend best, which is {resolved("best")}.
 {help_text()}

@@ -15,12 +15,13 @@ from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Stopwatch
 from benchmarks.planning import FLOOR, cluttered
 from benchmarks.rows import Effort, Goal, Row, alone, timed
-from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import counted
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import CAVE, CLIFF, LAB, OCCLUSIONS, OFFICE, ROOM, find_scenario
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.observation import Observation
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import CAVE, CLIFF, LAB, OCCLUSIONS, OFFICE, ROOM, find_scenario
 from entropy_explore_env.worlds.world import World
 
 _FAR = {"reach_m": math.inf}

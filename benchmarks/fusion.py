@@ -24,8 +24,9 @@ from entropy_explore_env.robots.range_sensor import (
     sensor_model,
     take_scan,
 )
-from entropy_explore_env.scenarios import ROOM
-from entropy_explore_env.settings import Grid, RangeSensor
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import ROOM
+from entropy_explore_env.settings.sensor import RangeSensor
 
 FINE_GRID = Grid((103, 103, 43), 0.1, ROOM.grid.origin_m)
 """The room of 10.25 × 10.25 × 4.25 m in voxels of 0.1 m, rounded up."""

@@ -17,9 +17,11 @@ from benchmarks.peers import Spread
 from benchmarks.rows import Effort, Goal, Job, Row, Taken, alone, compared, interleave, timed
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import ROOM
-from entropy_explore_env.settings import Ending, Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.ending import Ending
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import ROOM
 
 ROBOTS = 4
 TURNING = with_settings(

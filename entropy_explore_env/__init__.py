@@ -15,8 +15,6 @@ from entropy_explore_env import starting  # noqa: F401 - first, since all that f
 import gymnasium
 import pettingzoo
 
-from entropy_explore_env.channel_settings import Channel, Signal
-from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv, env, parallel_env
 from entropy_explore_env.envs.rewards import StepFigures
 from entropy_explore_env.envs.single_env import SingleRobotEnv
@@ -31,16 +29,26 @@ from entropy_explore_env.errors import (
     WorldError,
     WorldWarning,
 )
-from entropy_explore_env.fault_settings import Faults, Outage, RadioFault, SensorFault
-from entropy_explore_env.localization_settings import Fiducials, Localization
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.channel import Delivery
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import SCENARIOS, find_scenario
-from entropy_explore_env.settings import Ending, Grid, RangeSensor, Reward, Robot, RobotKind
+from entropy_explore_env.settings.action import Action
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.channel import Channel, Signal
+from entropy_explore_env.settings.ending import Ending
+from entropy_explore_env.settings.faults import Faults, Outage, RadioFault, SensorFault
+from entropy_explore_env.settings.fiducials import Fiducials
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.localization import Localization
+from entropy_explore_env.settings.observation import Observation
+from entropy_explore_env.settings.reward import Reward
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import SCENARIOS, find_scenario
+from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.worlds.load import load_octomap, load_world, make_world, save_world
 from entropy_explore_env.worlds.world import World

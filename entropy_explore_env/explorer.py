@@ -24,8 +24,9 @@ from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.planner.tour import SharedTour
 from entropy_explore_env.planner.weights import PlannerWeights
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
 
 _EVERYTHING = 0.995

@@ -13,7 +13,7 @@ import numpy as np
 
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.validation import is_whole
+from entropy_explore_env.settings.validation import is_whole
 
 
 class Stream(enum.IntEnum):

@@ -25,7 +25,7 @@ from entropy_explore_env.compilation.announcement import compiled_kernels, short
 from entropy_explore_env.compilation.folder import kernel_folder
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError, one_of
-from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.settings.scenarios import SCENARIOS
 
 _MAX_PROCESSES = 256
 

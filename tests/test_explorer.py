@@ -10,8 +10,8 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.explorer import PlannedRate
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS, find_scenario
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import BOX, ROOM, SCENARIOS, find_scenario
 
 
 class FirstCandidate:

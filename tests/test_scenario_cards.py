@@ -20,12 +20,14 @@ from docs.extensions import scenario_times
 from docs.extensions.attribute_docs import attribute_docs, constant_docs
 from docs.extensions.scenario_cards import card, gallery
 from docs.extensions.space_numbers import action_numbers, discrete_actions, observation_numbers
-from entropy_explore_env import Channel, Ending, RangeSensor, Robot, environment_id, scenarios
+from entropy_explore_env import Channel, Ending, RangeSensor, Robot, environment_id
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation.layout import ObservationLayout
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.settings import scenarios
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import SCENARIOS
 from entropy_explore_env.version import VERSION
 from tests.code_blocks import DOCS, FENCED
 

@@ -80,7 +80,7 @@ def test_a_folder_that_cannot_be_written_is_refused_by_name_before_a_mission_run
 def test_a_checkpoint_on_a_full_disk_leaves_the_one_before(tmp_path):
     import torch
 
-    from entropy_explore_env.scenarios import BOX
+    from entropy_explore_env.settings.scenarios import BOX
     from training.checkpoints import Checkpoint, PolicySettings, latest_checkpoint, save_checkpoint
 
     def checkpoint(steps):

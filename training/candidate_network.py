@@ -33,7 +33,7 @@ from torch.nn import functional
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.observation.layout import ObservationLayout, Part
 from entropy_explore_env.planner.candidate_features import COLUMNS
-from entropy_explore_env.validation import is_whole
+from entropy_explore_env.settings.validation import is_whole
 
 WIDTH = 64
 """D, units of each candidate."""

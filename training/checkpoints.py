@@ -35,8 +35,8 @@ from safetensors.torch import save as bytes_of
 from entropy_explore_env.errors import EntropyExploreError, SettingError, one_of
 from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.planner.candidate_features import COLUMNS, CONTEXT_COLUMNS, FEATURES_VERSION
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings_json import scenario_of, settings_of
+from entropy_explore_env.settings.json import scenario_of, settings_of
+from entropy_explore_env.settings.scenario import Scenario
 from training.candidate_network import ATTENTION_LAYERS, check_attention_layers
 from training.networks import NETWORKS
 

@@ -34,9 +34,10 @@ from baselines.experiments.trials import Cell, How, by_cell, run_cells
 from baselines.strategies import is_learned, make_strategy, resolved
 from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.explorer import PlannedRate
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import SCENARIOS, find_scenario
-from entropy_explore_env.validation import check_whole
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import SCENARIOS, find_scenario
+from entropy_explore_env.settings.validation import check_whole
 from training import extra  # noqa: F401 - before what is not there without it
 from training.checkpoints import latest_checkpoint, load_checkpoint
 from training.policy import POLICIES, PREFIX, policy_folder

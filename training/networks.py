@@ -21,7 +21,7 @@ from torch.distributions import Categorical
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation.layout import ObservationLayout, Part
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 from training.candidate_network import ATTENTION_LAYERS, CandidatePolicy, candidate_parts
 
 

@@ -19,7 +19,7 @@ from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.planner.candidate_features import FEATURES_VERSION
 from entropy_explore_env.planner.weights import SHIPPED
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 from training.advantages import Normaliser
 from training.candidate_network import ATTENTION_LAYERS, CandidatePolicy
 from training.checkpoints import (

@@ -49,8 +49,8 @@ from entropy_explore_env.envs.privileged_vec_env import PrivilegedVecEnv
 from entropy_explore_env.envs.rewards import StepFigures
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.validation import check_whole
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.validation import check_whole
 from entropy_explore_env.writing import write_atomically
 from training import extra  # noqa: F401 - before what is not there without it
 from training.advantages import DecisionBuffer, DiscountUnit, Normaliser

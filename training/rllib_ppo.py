@@ -36,7 +36,7 @@ from baselines.cli.task_options import (
 )
 from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.validation import check_whole
+from entropy_explore_env.settings.validation import check_whole
 from training import extra  # noqa: F401 - before what is not there without it
 from training.advantages import DiscountUnit
 from training.checkpoints import NotFiniteError, SilentRunnersError

@@ -18,7 +18,7 @@ from baselines.cli.task_options import base_task, tasked
 from baselines.experiments import ray_cluster
 from baselines.experiments.tables import csv_table
 from entropy_explore_env.errors import MissingExtraError
-from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.writing import write_atomically
 from training.advantages import Discounting
 from training.checkpoints import PolicySettings, checkpoint_name, forget_later, save_checkpoint

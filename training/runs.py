@@ -19,8 +19,8 @@ from stable_baselines3 import PPO
 from baselines.cli.arguments import parse
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.settings_json import dataclass_of, json_of
-from entropy_explore_env.validation import check_whole, is_whole
+from entropy_explore_env.settings.json import dataclass_of, json_of
+from entropy_explore_env.settings.validation import check_whole, is_whole
 from entropy_explore_env.writing import write_atomically
 from training.advantages import DecisionBuffer, Normaliser
 from training.checkpoints import (

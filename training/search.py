@@ -48,9 +48,10 @@ from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.planner.candidate_features import COLUMNS
 from entropy_explore_env.planner.weights import CANDIDATES, PlannerWeights, read_weights
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.settings_json import settings_of
-from entropy_explore_env.validation import check_whole, is_number
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.json import settings_of
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.validation import check_whole, is_number
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.writing import write_atomically
 from training.evaluate import task_of  # which says what is missing without the extra

@@ -27,7 +27,8 @@ from baselines.experiments.mission import Surroundings, run_mission, scripted
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
 from training.candidate_network import CandidatePolicy
 from training.policy import LearnedPolicy, choose_actions, misfit
 

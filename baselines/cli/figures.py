@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from entropy_explore_env.reports.colours import robot_colour
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 
 COLOURS = tuple(tuple(level / 255 for level in robot_colour(robot)) for robot in range(8))
 """Of the robots, as in every other picture; colour-blind people can tell them apart."""

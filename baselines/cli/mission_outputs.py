@@ -22,7 +22,7 @@ from entropy_explore_env.reports.mission_record import CommandRecorder, save_rec
 from entropy_explore_env.reports.painting import Painter
 from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.reports.rerun_view import RerunView
-from entropy_explore_env.settings_json import settings_of
+from entropy_explore_env.settings.json import settings_of
 from entropy_explore_env.writing import write_atomically
 
 _GIF_PICTURES, _GIF_FRAME_S, _GIF_LAST = 100, 0.1, 20

@@ -19,7 +19,7 @@ from entropy_explore_env.errors import counted
 from entropy_explore_env.reports.painting import entropy_share
 from entropy_explore_env.reports.recording import Recorder, believed_poses_now
 from entropy_explore_env.reports.rendering import estimate_outline
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 
 _UNKNOWN = "#c9d6e8"
 _UNKNOWN_ABOVE = 0.9

@@ -12,8 +12,9 @@ from typing import Any
 
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.painting import remaining_share
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import SCENARIOS
 
 LINE_EVERY_S = 15.0
 """On the clock, between two lines in place of a bar."""

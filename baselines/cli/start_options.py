@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 _ALLOWED = "JSON, or a file of it: for each robot [x, y, z, yaw, pitch], or [x, y, yaw] if it is planar"
 

@@ -19,15 +19,19 @@ from baselines.cli.arguments import OmitArgPrefixes
 from baselines.cli.start_options import given_json, reset_options
 from baselines.cli.world_options import Reading, world_settings
 from baselines.experiments.mission import Surroundings
-from entropy_explore_env.channel_settings import Channel
 from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.localization_settings import Fiducials
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import ROOM, SCENARIOS, find_scenario
-from entropy_explore_env.settings import Ending, RangeSensor, Robot, RobotKind
-from entropy_explore_env.settings_json import dataclass_of, scenario_of, settings_of
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.channel import Channel
+from entropy_explore_env.settings.ending import Ending
+from entropy_explore_env.settings.fiducials import Fiducials
+from entropy_explore_env.settings.json import dataclass_of, scenario_of, settings_of
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import ROOM, SCENARIOS, find_scenario
+from entropy_explore_env.settings.sensor import RangeSensor
 
 _WHOLE = ("name", "grid")
 """Settings of a file that is a scenario of its own, and no change of a named one."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from baselines.experiments.ray_cluster import AUTO, LOCAL, RayCluster, check_address
 from entropy_explore_env.errors import MissingExtraError
-from entropy_explore_env.validation import check_whole
+from entropy_explore_env.settings.validation import check_whole
 
 if TYPE_CHECKING:
     from baselines.experiments.trials import How

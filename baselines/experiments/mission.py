@@ -15,13 +15,14 @@ import numpy as np
 from baselines.experiments.rows import Record
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Stopwatch, Strategy, choose_all
-from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.planner.driver import Driver, Trail
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.recording import Recorder
-from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.observation import Observation
+from entropy_explore_env.settings.scenario import Scenario
 
 NOTHING_OBSERVED = Observation(panorama=False, self_state=False, team=False)
 """Strategies read RobotViews: an observation for networks would cost time for nothing."""

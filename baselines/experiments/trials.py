@@ -30,8 +30,8 @@ from baselines.experiments.rows import GrowingTable, Record, Row, trial_key
 from baselines.experiments.worker_pool import Failure, run_each
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Reward
+from entropy_explore_env.settings.reward import Reward
+from entropy_explore_env.settings.scenario import Scenario
 
 _PACE_PERIOD_S = 600.0
 """The bar estimates the time left from this much of the past: single missions differ a lot."""

@@ -9,9 +9,10 @@ import numpy as np
 
 from baselines.experiments.mission import Surroundings, run_mission, scripted
 from baselines.strategies import make_strategy
-from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.observation import Observation
+from entropy_explore_env.settings.scenario import Scenario
 
 Row = dict[str, Any]
 

@@ -13,8 +13,8 @@ import pyarrow as pa
 
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation.layout import ObservationLayout
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings_json import settings_of
+from entropy_explore_env.settings.json import settings_of
+from entropy_explore_env.settings.scenario import Scenario
 
 FORMAT = 1
 """Of the table, in the files' metadata."""

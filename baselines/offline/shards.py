@@ -16,7 +16,7 @@ from baselines.experiments.rows import Record, trial_key
 from baselines.experiments.trials import Cell, CellTrial, described
 from baselines.offline.recorded_env import Row, record_mission, recorded_env
 from baselines.offline.schema import schema_of
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 GROUP_ROWS = 4096
 """Rows of a row group."""

@@ -25,7 +25,7 @@ from entropy_explore_env.frontiers.knowledge import RobotKnowledge, stays, under
 from entropy_explore_env.planner.scene import Scene
 from entropy_explore_env.planner.stops import apart_m
 from entropy_explore_env.robots.motion import driving_time
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 _FIRST_REACH = 0.25
 """Paths are searched so far at first, in sensor ranges: most choices are nearer, and a search over a whole

@@ -18,7 +18,7 @@ import numpy as np
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig
-from entropy_explore_env.validation import check, check_choice, check_kind, check_not_negative
+from entropy_explore_env.settings.validation import check, check_choice, check_kind, check_not_negative
 
 
 class Options(NamedTuple):

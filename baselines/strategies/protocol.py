@@ -10,7 +10,7 @@ import numpy as np
 from entropy_explore_env.errors import ActionError
 from entropy_explore_env.frontiers.knowledge import random_viewpoint
 from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 __all__ = ["Stopwatch", "Strategy", "choose_all", "random_viewpoint"]
 

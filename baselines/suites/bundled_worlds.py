@@ -12,9 +12,10 @@ from typing import Any, NamedTuple
 from baselines.experiments.mission import scripted
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import SCENARIOS
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import SCENARIOS
 
 WORLDS = Path(__file__).parent / "worlds"
 DUNGEON_CELL_M = 0.1

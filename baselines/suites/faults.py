@@ -17,8 +17,9 @@ from baselines.experiments.claims import Claim
 from baselines.experiments.rows import Record
 from baselines.experiments.statistics import Interval, ratio_interval
 from baselines.suites.suite import QUICK_STARTS, TIME, TIME_90, Place, Records, Suite, Task
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import SCENARIOS
 
 TITLE = "Teams whose robots and messages fail"
 MEASURES = (TIME, TIME_90)

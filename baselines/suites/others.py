@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from baselines.strategies.table import suite_names
 from baselines.suites.suite import QUICK_STARTS, STARTS, TIME, TIME_90, Task, task_in, team_name
-from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.settings.scenarios import SCENARIOS
 
 TITLE = "Other scenarios, as they stand"
 MEASURES = (TIME, TIME_90)

@@ -22,8 +22,8 @@ from baselines.cli.task_options import (
 from baselines.experiments.mission import Surroundings, scripted_env
 from baselines.suites.suite import Place, Task, team_name
 from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldError, one_of
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import SCENARIOS, find_scenario
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import SCENARIOS, find_scenario
 from entropy_explore_env.worlds.formats import FORMATS
 from entropy_explore_env.worlds.given import GIVEN, distinct_names
 

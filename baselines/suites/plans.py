@@ -16,8 +16,9 @@ from typing import Any
 from baselines.strategies.table import suite_names
 from baselines.suites.bundled_worlds import dungeons, in_world
 from baselines.suites.suite import PATH, QUICK_STARTS, STARTS, TIME_99, Place, Task, task_in
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import SCENARIOS
 
 TITLE = "Plans: until everything is seen"
 MEASURES = (PATH, TIME_99)

@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 from baselines.experiments.mission import SuiteMission, Surroundings
 from baselines.experiments.rows import Record
 from baselines.experiments.trials import Cell, CellTrial
-from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
 
 STARTS, QUICK_STARTS = 30, 2
 """Missions of a task; quick suites take two processors less than ten minutes each."""

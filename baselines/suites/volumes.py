@@ -8,7 +8,7 @@ from __future__ import annotations
 from baselines.strategies.table import suite_names
 from baselines.suites.bundled_worlds import in_world
 from baselines.suites.suite import QUICK_STARTS, STARTS, TIME, TIME_90, Task, task_in, team_name
-from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.settings.scenarios import SCENARIOS
 
 TITLE = "Volumes and offices: until the map is known"
 MEASURES = (TIME, TIME_90)

@@ -23,7 +23,7 @@ from baselines.experiments.tables import markdown_table
 from benchmarks.proofs import determinism, files, kills, settings, soak, states, training
 from benchmarks.proofs.cases import Found, play_cases
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.validation import check_whole
+from entropy_explore_env.settings.validation import check_whole
 from entropy_explore_env.writing import write_atomically
 
 FAILED = 1

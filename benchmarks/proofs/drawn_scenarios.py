@@ -15,12 +15,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.channel_settings import Channel, Signal
-from entropy_explore_env.decision_settings import Action, Observation
-from entropy_explore_env.fault_settings import Faults, Outage, RadioFault, SensorFault
-from entropy_explore_env.localization_settings import Fiducials, Localization
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Ending, Grid, RangeSensor, Reward, Robot, RobotKind
+from entropy_explore_env.settings.action import Action
+from entropy_explore_env.settings.channel import Channel, Signal
+from entropy_explore_env.settings.ending import Ending
+from entropy_explore_env.settings.faults import Faults, Outage, RadioFault, SensorFault
+from entropy_explore_env.settings.fiducials import Fiducials
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.localization import Localization
+from entropy_explore_env.settings.observation import Observation
+from entropy_explore_env.settings.reward import Reward
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
 

@@ -133,7 +133,7 @@ def kill_trainer(folder: Path, moments: random.Random) -> int:
 def _write_checkpoints(folder: Path, told: Path, before: int) -> None:
     import torch
 
-    from entropy_explore_env.scenarios import BOX
+    from entropy_explore_env.settings.scenarios import BOX
     from training import checkpoints
     from training.checkpoints import Checkpoint, PolicySettings, TrainerState
 

@@ -26,8 +26,8 @@ from entropy_explore_env.reports.mission_record import (
     save_record,
 )
 from entropy_explore_env.reports.record_versions import named_digest
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import BOX
 
 Change = Callable[[bytes, np.random.Generator], bytes]
 _VALUES: tuple[Any, ...] = (None, True, -1, 0, 1e308, 2**40, 2**70, "x", "", [], {}, [[]], float("nan"))

@@ -12,7 +12,7 @@ from benchmarks.proofs.drawn_scenarios import draw_scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import EntropyExploreError, RecordError
 from entropy_explore_env.missions.state_ranges import check_ranges
-from entropy_explore_env.settings_json import settings_json
+from entropy_explore_env.settings.json import settings_json
 
 STEPS = 50
 WATCHDOG_S = 20.0

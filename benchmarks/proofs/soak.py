@@ -21,8 +21,8 @@ import numpy as np
 from benchmarks.proofs.cases import BrokenPromiseError, Found
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.missions.state_ranges import check_ranges
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import SCENARIOS
 
 ROBOT_STEPS = 20_000
 """Robot-steps of a case."""

@@ -11,8 +11,9 @@ from entropy_explore_env.errors import EntropyExploreError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.reports.state_values import state_digest
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import BOX
 
 STEPS = 20
 _BOX = {"robots": 3, "world": "furnished", "track_truth": True}

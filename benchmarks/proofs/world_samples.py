@@ -133,7 +133,7 @@ def geotiff(
 
 def saved_world() -> bytes:
     """A world of this library, with a ceiling."""
-    from entropy_explore_env.settings import Grid
+    from entropy_explore_env.settings.grid import Grid
     from entropy_explore_env.worlds.load import save_world
     from entropy_explore_env.worlds.world import World
 

@@ -12,12 +12,15 @@ from baselines.strategies import recommended, resolved
 from docs.extensions.attribute_docs import attribute_docs, constant_docs
 from docs.extensions.scenario_times import times_table
 from docs.extensions.space_numbers import Numbers, action_numbers, discrete_actions, observation_numbers
-from entropy_explore_env import environment_id, scenarios
+from entropy_explore_env import environment_id
 from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.missions.rules import rules_of
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import COST_PER_S_ALONE, SCENARIOS
-from entropy_explore_env.settings import RobotKind, gaussian_entropy_bits
+from entropy_explore_env.settings import scenarios
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.ending import gaussian_entropy_bits
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import COST_PER_S_ALONE, SCENARIOS
 from entropy_explore_env.worlds.load import make_world
 from entropy_explore_env.worlds.pictures import picture
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES

@@ -12,7 +12,7 @@ from baselines.suites import find_suite
 from baselines.suites.page import archive_of
 from baselines.suites.results import Results, results_of
 from baselines.suites.suite import TIME, TIME_99
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 
 class Time(NamedTuple):

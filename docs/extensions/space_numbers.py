@@ -12,7 +12,7 @@ from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation.layout import ObservationLayout, Part
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 
 class Numbers(NamedTuple):

@@ -14,8 +14,8 @@ import numpy as np
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.settings import Grid
-from entropy_explore_env.validation import is_number
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.validation import is_number
 
 _SWEEPS_AT_ONCE, _ROWS_AT_ONCE = 6, 32
 """Sweeps that go over the rows together, and rows of each before the next one: what is fastest."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from entropy_explore_env.belief.fields import occupancy_probability
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.settings import BITS_OF_UNIT_GAUSSIAN
+from entropy_explore_env.settings.ending import BITS_OF_UNIT_GAUSSIAN
 
 
 def map_entropy_bits(precision: np.ndarray) -> np.ndarray:

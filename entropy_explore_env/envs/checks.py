@@ -10,7 +10,7 @@ from gymnasium import spaces
 
 from entropy_explore_env.errors import ActionError, SettingError
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.validation import is_whole
+from entropy_explore_env.settings.validation import is_whole
 
 _ROUNDING = 1e-6
 

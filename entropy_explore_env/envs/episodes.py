@@ -14,7 +14,7 @@ from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.missions.observation.layout import action_count
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.world import World
 
 EPISODES = 2

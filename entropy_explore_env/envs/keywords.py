@@ -9,11 +9,17 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict
 
-from entropy_explore_env.channel_settings import Channel
-from entropy_explore_env.decision_settings import Action, Observation
-from entropy_explore_env.fault_settings import Faults
-from entropy_explore_env.localization_settings import Fiducials
-from entropy_explore_env.settings import Ending, Grid, RangeSensor, Reward, Robot, RobotKind
+from entropy_explore_env.settings.action import Action
+from entropy_explore_env.settings.channel import Channel
+from entropy_explore_env.settings.ending import Ending
+from entropy_explore_env.settings.faults import Faults
+from entropy_explore_env.settings.fiducials import Fiducials
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.observation import Observation
+from entropy_explore_env.settings.reward import Reward
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.worlds.world import World
 
 

@@ -24,8 +24,8 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView, view_of
 from entropy_explore_env.reports.painting import FRAMES_PER_S, Painter, check_render_mode, offered_modes
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import find_scenario
 from entropy_explore_env.worlds.given import with_given_worlds
 
 if TYPE_CHECKING:

@@ -15,7 +15,7 @@ from gymnasium import spaces
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import ActionError, MissingExtraError
 from entropy_explore_env.randomness import check_seed
-from entropy_explore_env.validation import check_instance
+from entropy_explore_env.settings.validation import check_instance
 
 if TYPE_CHECKING:
     from gymnasium import Env as MultiAgentEnv

@@ -28,8 +28,8 @@ from entropy_explore_env.missions.reset_options import (
 from entropy_explore_env.missions.snapshot import check_array, restore, snapshot
 from entropy_explore_env.missions.state import goals_reached
 from entropy_explore_env.randomness import check_seed
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.validation import check_instance, is_whole
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.validation import check_instance, is_whole
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

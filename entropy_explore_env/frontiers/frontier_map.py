@@ -17,9 +17,9 @@ from entropy_explore_env.frontiers.blocks import EXCLUDED, NONE, UNMAPPED, Block
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.frontiers.visibility import new_counter
 from entropy_explore_env.frontiers.voxel_states import VoxelStates
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import RobotKind
-from entropy_explore_env.validation import check, check_choice, check_positive
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.validation import check, check_choice, check_positive
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
 
 Visibility = Literal["ray-cast", "naive"]

@@ -14,8 +14,9 @@ import numpy as np
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.visibility import CONE, cone_of
 from entropy_explore_env.robots.motion import MoveEnd, driving_time
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Grid, RobotKind
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
 
 
 class TeammateKnowledge(Protocol):

@@ -19,8 +19,8 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.frontiers.voxel_map import voxels_around
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
 
 _ROOM, _ROOM_DRAWS = 40, 64
 """Voxels along each axis within which places are drawn that make room for others, and how many are drawn."""

@@ -21,7 +21,7 @@ from entropy_explore_env.belief.raycast import (
     longest_crossing,
 )
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.settings.robot_kind import RobotKind
 
 MOST_RAYS = 720
 _ROWS = 15

@@ -32,8 +32,8 @@ from entropy_explore_env.frontiers.terrain_visibility import (
     half_widths,
     mean_ground,
 )
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
 
 PATCH_M = 5.0
 """Half the width of the patch whose mean ground is z_av."""

@@ -41,8 +41,8 @@ from entropy_explore_env.frontiers.voxel_map import (
     voxels_around,
 )
 from entropy_explore_env.frontiers.voxel_states import new_states
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
 
 BLOCK = 4
 """Voxels along the edge of a block, unless settings say otherwise."""

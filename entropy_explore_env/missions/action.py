@@ -27,7 +27,7 @@ from gymnasium import spaces
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.errors import ActionError
 from entropy_explore_env.missions.rules import Rules, rules_of
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 ROUNDING = 1e-6
 """A displacement may exceed the reach by this share: the rounding of float32 actions."""

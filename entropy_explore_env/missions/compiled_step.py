@@ -23,7 +23,7 @@ from entropy_explore_env.missions.workspace import Workspace, new_workspace
 from entropy_explore_env.planner.model import Proposer, new_proposers
 from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.robots.navigator import new_navigators
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 _CHUNKS_PER_THREAD = 4
 """Missions differ in work; smaller chunks even it out."""

@@ -18,8 +18,8 @@ from entropy_explore_env.missions.rules import Rules
 from entropy_explore_env.missions.starts import checked_starts, start_poses
 from entropy_explore_env.missions.state import MissionState
 from entropy_explore_env.randomness import Stream, generator, splitmix_states
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import gaussian_entropy_bits
+from entropy_explore_env.settings.ending import gaussian_entropy_bits
+from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.given import world_in_turn
 from entropy_explore_env.worlds.load import make_world, require_unchanged
 from entropy_explore_env.worlds.sight import visible_from

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.fault_settings import Outage
 from entropy_explore_env.missions.state import FAULT
 from entropy_explore_env.randomness import Stream, draw_uniform, splitmix_states
 from entropy_explore_env.robots.faults import drop_scan, spoil_scan
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.faults import Outage
+from entropy_explore_env.settings.scenario import Scenario
 
 OUTAGES = ("stop", "blind", "silent")
 """Those of Faults; in FAULT, `…_s` and `…_until_s` are when they begin and end."""

@@ -14,7 +14,7 @@ from entropy_explore_env.randomness import Stream, generator
 from entropy_explore_env.robots.localization import correct_estimate, sighting_error
 from entropy_explore_env.robots.pose_covariance import in_field_of_view
 from entropy_explore_env.robots.range_sensor import body_distance
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.world import World
 
 _ON_FACE = 0.49

@@ -23,7 +23,7 @@ from entropy_explore_env.planner.model import proposal_bytes
 from entropy_explore_env.robots.map_summary import summary_bytes
 from entropy_explore_env.robots.navigator import navigator_bytes
 from entropy_explore_env.robots.range_sensor import scan_bytes
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
 

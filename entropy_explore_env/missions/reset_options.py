@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from entropy_explore_env.errors import SettingError, WorldError, did_you_mean
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.validation import is_whole
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.validation import is_whole
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.splits import WORLD_NUMBERS
 from entropy_explore_env.worlds.world import World

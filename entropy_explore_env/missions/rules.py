@@ -9,12 +9,12 @@ import numpy as np
 
 from entropy_explore_env.belief.pooling import Cells, new_cells, no_cells
 from entropy_explore_env.compilation.kernels import record_type
-from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.robots.faults import FAULT_PARAMS
 from entropy_explore_env.robots.localization import LOCALIZATION_PARAMS
 from entropy_explore_env.robots.range_sensor import TeamSensors, team_sensors
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Robot
+from entropy_explore_env.settings.observation import Observation
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.scenario import Scenario
 
 PARAMS = record_type(
     [

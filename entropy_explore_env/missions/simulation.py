@@ -20,9 +20,9 @@ from entropy_explore_env.missions.state import MissionEnd, MissionState, new_sta
 from entropy_explore_env.missions.state_ranges import FROM_WORLD, check_ranges
 from entropy_explore_env.randomness import Stream, check_seed, generator
 from entropy_explore_env.robots.range_sensor import true_coverage
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Grid
-from entropy_explore_env.validation import check_instance, check_whole, is_whole
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.validation import check_instance, check_whole, is_whole
 from entropy_explore_env.worlds.given import checked_worlds, in_given_worlds
 from entropy_explore_env.worlds.load import world_of_file
 from entropy_explore_env.worlds.world import World

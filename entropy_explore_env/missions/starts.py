@@ -7,8 +7,8 @@ import math
 import numpy as np
 
 from entropy_explore_env.errors import SettingError, WorldError
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.world import Collision, World
 
 _PLACING_ATTEMPTS = 64

@@ -20,7 +20,7 @@ from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE
 from entropy_explore_env.robots.landmarks import LANDMARK
 from entropy_explore_env.robots.localization import COVARIANCE_NUMBERS, ESTIMATE
 from entropy_explore_env.robots.map_summary import PARCEL, SUMMARY, summary_bytes
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 
 class MissionEnd(enum.Enum):

@@ -20,8 +20,8 @@ from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.robots.map_summary import is_summary
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.range_sensor import Return
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import MAX_VOXELS
+from entropy_explore_env.settings.grid import MAX_VOXELS
+from entropy_explore_env.settings.scenario import Scenario
 
 FROM_WORLD = ("truth", "collision", "visible")
 """Arrays of the state that follow from a mission's world, which its seed and what was given determine."""

@@ -19,8 +19,8 @@ from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.robots.landmarks import LANDMARK
 from entropy_explore_env.robots.localization import believed_point
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.world import no_fly_mask
 
 

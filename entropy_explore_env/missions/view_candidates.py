@@ -10,7 +10,7 @@ from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
 from entropy_explore_env.planner.model import new_proposers
 from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE, Kind
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 _NO_CEILING = np.zeros(0, np.bool_)
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from entropy_explore_env.belief.pooling import Pool, pool_belief
 from entropy_explore_env.belief.raycast import Crossing
-from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.missions.action import decode_action
 from entropy_explore_env.missions.observation.layout import ObservationLayout, part_offsets
 from entropy_explore_env.missions.observation.observe import Known, observe_robot
@@ -17,7 +16,10 @@ from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_candidates import ViewProposer, writable
 from entropy_explore_env.robots.range_sensor import new_scan
-from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.settings.action import Action
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.observation import Observation
+from entropy_explore_env.settings.scenario import Scenario
 
 
 class ViewObserver:

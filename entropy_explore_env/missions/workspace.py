@@ -15,7 +15,7 @@ from entropy_explore_env.robots.map_summary import new_summary_tree
 from entropy_explore_env.robots.map_tree import Tree
 from entropy_explore_env.robots.navigator import Navigator, footprints
 from entropy_explore_env.robots.range_sensor import new_scan
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 
 class Workspace(NamedTuple):

@@ -29,7 +29,7 @@ import numpy as np
 
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, random_viewpoint
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 _ASIDE = 2
 """How often in a row a robot steps aside before it makes room."""

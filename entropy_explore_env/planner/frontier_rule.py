@@ -33,7 +33,7 @@ from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.driver import Driver
 from entropy_explore_env.planner.scene import NOWHERE, ROOM, STAY, Goal, Scene, scanned_here
 from entropy_explore_env.planner.stops import apart_m, stop_towards
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 _GAZES = 4
 """A cell is dropped when the robot has looked from it in this many directions."""

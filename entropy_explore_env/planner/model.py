@@ -22,8 +22,8 @@ from entropy_explore_env.planner.far_places import Blocks, new_blocks
 from entropy_explore_env.planner.recipe import Recipe, angular_spread, recipe_for
 from entropy_explore_env.planner.records import KNOWLEDGE, MATE, OPTION, VIEW
 from entropy_explore_env.planner.thresholds import REFINED_AROUND
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import DriveModel, robot_model, sees_all_around
 from entropy_explore_env.viewpoints.expected_scan import ScanModel, ScanScratch, new_scan_scratch
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.planner.candidate_features import COLUMNS, FEATURES_VERSION
-from entropy_explore_env.validation import is_number, is_whole
+from entropy_explore_env.settings.validation import is_number, is_whole
 
 SHIPPED = Path(__file__).parent / "learned"
 """Folder of the weights that come with the library, as NAME.json."""

@@ -13,7 +13,7 @@ import numpy as np
 from PIL import Image
 
 from entropy_explore_env.errors import MissingExtraError, SettingError
-from entropy_explore_env.validation import is_whole
+from entropy_explore_env.settings.validation import is_whole
 from entropy_explore_env.writing import write_atomically
 
 COLOUR_CODES = 1 << 15

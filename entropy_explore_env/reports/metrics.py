@@ -22,8 +22,8 @@ from entropy_explore_env.robots.range_sensor import (
     take_scan,
     true_coverage,
 )
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.world import World
 
 _FLOOR_SCANS = 256

@@ -30,9 +30,9 @@ from entropy_explore_env.reports.record_versions import (
     named_digest,
 )
 from entropy_explore_env.reports.state_values import state_digest
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings_json import scenario_from_json, settings_json
-from entropy_explore_env.validation import checked_path
+from entropy_explore_env.settings.json import scenario_from_json, settings_json
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.validation import checked_path
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.worlds.files.archives import arrays
 from entropy_explore_env.worlds.files.voxels import MAX_FILE_VOXELS, RefusedError

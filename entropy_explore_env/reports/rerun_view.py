@@ -25,7 +25,7 @@ from entropy_explore_env.reports.projection import KNOWN_BELOW
 from entropy_explore_env.reports.recording import DrivenPaths, poses_now
 from entropy_explore_env.robots.channel import select_measurements
 from entropy_explore_env.robots.range_sensor import Return, sensor_model
-from entropy_explore_env.settings import RangeSensor
+from entropy_explore_env.settings.sensor import RangeSensor
 
 TIMELINE = "simulated"
 MAX_CELLS = 300_000

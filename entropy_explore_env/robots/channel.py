@@ -95,7 +95,7 @@ def edges_in_walls(air, size, start, finish):
 
 @lean_kernel
 def path_loss_db(apart_m, exponent, wall_loss_db_per_m, walls_m):
-    """What the way beyond the first metre costs: see `channel_settings.Signal`.
+    """What the way beyond the first metre costs: see `settings.channel.Signal`.
 
     Args:
         apart_m: Distance between sender and teammate.

@@ -23,7 +23,7 @@ FAULT_PARAMS = record_type(
         ("late_s", "f8"),
     ],
 )
-"""What is wrong with a robot all through a mission, in the units of `fault_settings`."""
+"""What is wrong with a robot all through a mission, in the units of `settings.faults`."""
 
 
 @lean_kernel

@@ -42,7 +42,7 @@ LOCALIZATION_PARAMS = record_type(
         ("landmarks_apart_m", "f8"),
     ],
 )
-"""How a robot localises itself, in the units of `localization_settings`, standard deviations squared."""
+"""How a robot localises itself, in the units of `settings.localization`, standard deviations squared."""
 
 ESTIMATE = record_type(
     [

@@ -23,7 +23,7 @@ from entropy_explore_env.robots.map_tree import (
     write_tree,
 )
 from entropy_explore_env.robots.range_coder import begin_reading, begin_writing, end_writing
-from entropy_explore_env.validation import is_number
+from entropy_explore_env.settings.validation import is_number
 
 _MAGIC = np.uint8(0xE5)
 """The first byte; the second one is a form."""

@@ -27,8 +27,8 @@ from entropy_explore_env.belief.paths.string_pulling import Path, line_of_sight_
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Robot
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.scenario import Scenario
 
 _ARRIVED, _NO_PATH, _CORNERS = MoveEnd.ARRIVED.code, MoveEnd.NO_PATH.code, MoveEnd.CORNERS.code
 _SLACK = 1e-9

@@ -30,7 +30,8 @@ from entropy_explore_env.belief.raycast import (
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 from entropy_explore_env.randomness import draw_gaussian
 from entropy_explore_env.robots.measured_rays import trace_measurement, weigh_measurement
-from entropy_explore_env.settings import Grid, RangeSensor, centred_angles
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.sensor import RangeSensor, centred_angles
 
 _NOTHING, _FREE, _HIT = int(Return.NOTHING), int(Return.FREE), int(Return.HIT)
 NEAREST = 1e-3

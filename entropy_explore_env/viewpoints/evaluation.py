@@ -28,8 +28,10 @@ from entropy_explore_env.belief.raycast import (
 from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.robots.motion import driving_time, turning_time
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Grid, RangeSensor, RobotKind, centred_angles
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.sensor import RangeSensor, centred_angles
 from entropy_explore_env.viewpoints.expected_scan import ScanModel, ScanScratch, new_scan_scratch
 
 STRAIGHTENED = 0.96

@@ -20,9 +20,10 @@ import numpy as np
 from entropy_explore_env.command import LineParser, run_command
 from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.randomness import Stream, check_seed, generator
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import SCENARIOS
-from entropy_explore_env.validation import is_whole
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import SCENARIOS
+from entropy_explore_env.settings.validation import is_whole
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
 from entropy_explore_env.worlds.formats import FORMATS, WORDS
 from entropy_explore_env.worlds.given import in_given_worlds

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from entropy_explore_env.errors import SettingError, WorldError, one_of
-from entropy_explore_env.validation import is_number
+from entropy_explore_env.settings.validation import is_number
 from entropy_explore_env.worlds.files.map_server import RULES
 from entropy_explore_env.worlds.files.process import Format
 

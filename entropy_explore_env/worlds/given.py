@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from entropy_explore_env.errors import SettingError, WorldError, WorldWarning
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
 from entropy_explore_env.worlds.files.voxels import box_of_use, cropped_note
 from entropy_explore_env.worlds.formats import FORMATS

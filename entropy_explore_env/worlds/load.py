@@ -13,10 +13,10 @@ from typing import Any, ParamSpec
 import numpy as np
 
 from entropy_explore_env.errors import SettingError, WorldError, WorldWarning, did_you_mean
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.settings import Grid
-from entropy_explore_env.validation import check_instance, checked_path, is_whole
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import find_scenario
+from entropy_explore_env.settings.validation import check_instance, checked_path, is_whole
 from entropy_explore_env.worlds.files.archives import restored, saved
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
 from entropy_explore_env.worlds.files.process import Limits, read_apart

@@ -21,7 +21,7 @@ from PIL import Image, ImageDraw
 from scipy import ndimage
 
 from entropy_explore_env.picture_text import font, shortened, text_width
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World, box_around, part_of
 
 _LONG_SIDE = 880

@@ -9,8 +9,8 @@ import numpy as np
 from scipy import ndimage
 
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import RobotKind
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.components import connected_components
 from entropy_explore_env.worlds.world import Collision, World
 

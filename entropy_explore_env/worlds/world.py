@@ -13,9 +13,10 @@ from scipy import ndimage
 from scipy.spatial import ConvexHull
 
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Grid, RobotKind
-from entropy_explore_env.validation import check_instance, is_number
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.validation import check_instance, is_number
 from entropy_explore_env.worlds.components import connected_components, largest_component
 
 

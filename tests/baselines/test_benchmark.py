@@ -28,10 +28,10 @@ from benchmarks.proofs.world_samples import pgm
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX, LAB, SCENARIOS
-from entropy_explore_env.settings import Grid
-from entropy_explore_env.settings_json import settings_json
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.json import settings_json
+from entropy_explore_env.settings.scenarios import BOX, LAB, SCENARIOS
 from entropy_explore_env.worlds.load import FORMATS, save_world
 from entropy_explore_env.worlds.world import World
 from tests.systems import needs_posix

@@ -13,7 +13,7 @@ from baselines.cli.arguments import run_command
 from baselines.experiments.mission import mission_record, scripted_env
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import choose_all
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.scenarios import BOX
 
 pq = pytest.importorskip("pyarrow.parquet", reason="pip install 'entropy_explore_env[episodes]'")
 
@@ -83,7 +83,7 @@ def test_rows_say_what_each_robot_saw_chose_and_earned(written, capsys):
 
 
 def recorded_scenario(folder: Path):
-    from entropy_explore_env.settings_json import scenario_of
+    from entropy_explore_env.settings.json import scenario_of
 
     metadata = json.loads(pq.read_schema(next(folder.glob("*.parquet"))).metadata[METADATA])
     assert metadata["strategy"] == "gradient" and metadata["parts"]["panorama"][0] == 0

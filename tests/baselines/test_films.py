@@ -10,7 +10,7 @@ from PIL import Image
 from baselines import films
 from baselines.cli.arguments import run_command
 from entropy_explore_env.reports.animation import Film
-from entropy_explore_env.scenarios import BOX, SCENARIOS
+from entropy_explore_env.settings.scenarios import BOX, SCENARIOS
 
 ROOT = Path(__file__).parents[2]
 

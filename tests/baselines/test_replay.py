@@ -13,7 +13,7 @@ import pytest
 from baselines import replay, run
 from baselines.cli.arguments import run_command
 from entropy_explore_env.reports.mission_record import load_record, save_record
-from entropy_explore_env.settings_json import scenario_of
+from entropy_explore_env.settings.json import scenario_of
 from entropy_explore_env.worlds import load
 from entropy_explore_env.worlds.load import save_world
 from tests.reference.scenes import free_box, started

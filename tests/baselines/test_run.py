@@ -28,8 +28,8 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.mission_record import load_record
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import BOX
 from entropy_explore_env.worlds.load import LOAD_OPTIONS
 from tests.systems import needs_posix
 

@@ -20,7 +20,7 @@ from entropy_explore_env.belief.elevation import (
     elevation_map,
 )
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from tests.reference.scenes import drawn, seeds
 
 SIZE = (7, 11, 5)

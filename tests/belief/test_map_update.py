@@ -13,7 +13,7 @@ from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.map_update import expected_utility, fuse_ray, fuse_row
 from entropy_explore_env.belief.measurement_model import measured_coverage, measurement_precision
 from entropy_explore_env.belief.raycast import NEVER_STOP, Line, cast_ray
-from entropy_explore_env.settings import gaussian_entropy_bits
+from entropy_explore_env.settings.ending import gaussian_entropy_bits
 from tests.reference import rocha04
 from tests.reference.scenes import (
     as_arrays,

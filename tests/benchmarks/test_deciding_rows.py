@@ -7,7 +7,7 @@ from PIL import Image
 
 from benchmarks.deciding import decision_row, episodes_row, floor, floor_row, plan_rows, room_row, scanner_row
 from benchmarks.rows import Effort
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.scenarios import BOX
 from entropy_explore_env.worlds.load import load_world
 
 TINY = Effort(rounds=2, long_rounds=1, steps=6)

@@ -16,8 +16,9 @@ from benchmarks import speed, startup, stepping
 from benchmarks.fusion import Fusion, Measurements, fuse_floor, grid_rows, measure_room
 from benchmarks.rows import Effort, Goal, Row, Taken, alone, compared, interleave, timed
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenarios import ROOM
-from entropy_explore_env.settings import Grid, RangeSensor
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import ROOM
+from entropy_explore_env.settings.sensor import RangeSensor
 
 TINY = Effort(scans=10, rounds=2, long_rounds=1, steps=4, missions=(1, 2), starts=1, large=False)
 BOX = Grid((7, 11, 5), 0.5, (1.0, -2.0, 0.25))

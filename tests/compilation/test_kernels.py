@@ -208,8 +208,8 @@ INTERPRETED = """
 import numpy as np
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.state_values import state_digest
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import BOX
 
 missions = Missions(with_settings(BOX, {"robots": 3, "world": "furnished", "track_truth": True,
     "channel": {"delay_s": 1.0, "loss_probability": 0.2}, "sensor": {"scan_every_m": 0.3},

@@ -23,8 +23,8 @@ from entropy_explore_env.envs.conformance import (
     leaves,
     require_same,
 )
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
 from tests.envs.pairwise import pairwise
 from tests.reference.scenes import SMALL
 

@@ -22,7 +22,7 @@ from pettingzoo.test import (
 import entropy_explore_env
 from entropy_explore_env import env, environment_id, parallel_env
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.settings.scenarios import SCENARIOS
 from tests.envs.pairwise import params
 from tests.reference.scenes import SMALL
 

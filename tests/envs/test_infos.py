@@ -10,7 +10,7 @@ import pytest
 
 from entropy_explore_env import EntropyExploreEnv, RobotView, parallel_env
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from tests.reference.scenes import SMALL
 
 BOX = "box-7x11x5"

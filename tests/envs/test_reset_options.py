@@ -30,7 +30,7 @@ from entropy_explore_env.reports.mission_record import (
     same_end,
     save_record,
 )
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.load import world_with_number
 from entropy_explore_env.worlds.splits import WORLD_NUMBERS
 

@@ -18,9 +18,9 @@ from entropy_explore_env.envs.infos import END_FIGURES
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX, COST_PER_S_ALONE, SCENARIOS, find_scenario
-from entropy_explore_env.settings import Reward
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.reward import Reward
+from entropy_explore_env.settings.scenarios import BOX, COST_PER_S_ALONE, SCENARIOS, find_scenario
 
 SHORT = {"robots": 2, "time_limit_s": 6.0, "action": {"kind": "discrete", "moves": "axes"}}
 

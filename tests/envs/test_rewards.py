@@ -15,7 +15,9 @@ from entropy_explore_env import SettingError, SingleRobotEnv, StepFigures, env, 
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.reports.mission_record import CommandRecorder
-from entropy_explore_env.settings import RangeSensor, Robot, RobotKind
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.sensor import RangeSensor
 
 FAST = Robot(max_speed_m_s=0.5, acceleration_m_s2=0.5, reach_m=1.0, body_radius_m=0.1)
 SLOW = Robot(max_speed_m_s=0.125, acceleration_m_s2=0.125, reach_m=1.0, body_radius_m=0.1)

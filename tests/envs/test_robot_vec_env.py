@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from stable_baselines3.common.vec_env import VecEnv
 
-from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.errors import RecordError, SettingError
 from entropy_explore_env.missions.snapshot import restore, snapshot
+from entropy_explore_env.settings.action import Action
+from entropy_explore_env.settings.observation import Observation
 
 MISSIONS, ROBOTS = 3, 2
 SEEDS = [11, 5, 2**70]

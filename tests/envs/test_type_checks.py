@@ -18,7 +18,7 @@ from entropy_explore_env.envs.keywords import ScenarioSettings
 ROOT = Path(__file__).parents[2]
 GOOD = """
 from entropy_explore_env import EntropyExploreVectorEnv, SingleRobotEnv, env, load_world, parallel_env
-from entropy_explore_env.channel_settings import Channel
+from entropy_explore_env.settings.channel import Channel
 
 team = parallel_env("room", robots=3, channel={"burst": 32}, max_cycles=None, decision_period_s=None)
 turns = env("office", track_truth=True, world="map.png")

@@ -15,9 +15,9 @@ from entropy_explore_env.missions.action import ROUNDING as PULLED_IN_BEYOND
 from entropy_explore_env.missions.action import action_space, decode_action, encode_viewpoint
 from entropy_explore_env.missions.observation.mask import write_mask
 from entropy_explore_env.missions.rules import discrete_moves, rules_of
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import BOX
 from tests.reference.scenes import drawn, free_box, seeds
 
 ODD_GRID = Grid((7, 11, 5), 0.3, (-1.7, 0.4, 2.05))

@@ -11,7 +11,7 @@ from entropy_explore_env.missions import episode
 from entropy_explore_env.missions.poses import place_at, pose_at
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import build, free_box, put, started
 

@@ -10,12 +10,12 @@ import pytest
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.landmark_score import landmark_score
 from entropy_explore_env.errors import RecordError, SettingError
-from entropy_explore_env.localization_settings import Fiducials
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.state_values import state_digest, state_values
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.fiducials import Fiducials
+from entropy_explore_env.settings.grid import Grid
 from tests.missions.test_tick import toward
 from tests.reference.scenes import build, free_box, put, started, wander
 

@@ -14,7 +14,6 @@ from hypothesis import strategies as st
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.errors import RecordError, SettingError, WorldError
-from entropy_explore_env.localization_settings import Fiducials, Localization
 from entropy_explore_env.missions.fiducials import fiducial_places
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.simulation import Missions
@@ -24,8 +23,10 @@ from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.state_values import state_digest
 from entropy_explore_env.robots.channel import BITS_PER_BATCH, BITS_PER_COVARIANCE, BITS_PER_MEASUREMENT
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.settings_json import scenario_from_json, settings_json
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.fiducials import Fiducials
+from entropy_explore_env.settings.json import scenario_from_json, settings_json
+from entropy_explore_env.settings.localization import Localization
 from entropy_explore_env.worlds.load import make_world
 from entropy_explore_env.worlds.world import World
 from tests.missions.replays import check_replay

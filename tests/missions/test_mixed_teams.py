@@ -17,10 +17,13 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import information_floor
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import OFFICE_3D, OFFICE_MIXED
-from entropy_explore_env.settings import Grid, RangeSensor, Robot, RobotKind
-from entropy_explore_env.settings_json import scenario_from_json, settings_json
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.json import scenario_from_json, settings_json
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenarios import OFFICE_3D, OFFICE_MIXED
+from entropy_explore_env.settings.sensor import RangeSensor
 from tests.reference.scenes import free_box, put, random_actions, started, wander
 
 GROUND = RobotKind(

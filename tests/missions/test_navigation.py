@@ -13,9 +13,9 @@ from entropy_explore_env.envs.conformance import check_conformance
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import OFFICE, ROOM_FURNISHED, SCENARIOS, TERRAIN
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import OFFICE, ROOM_FURNISHED, SCENARIOS, TERRAIN
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box, random_actions, started, wander
 

@@ -13,7 +13,9 @@ from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.range_sensor import Scene, SensorPose, new_scan, sensor_model, take_scan
-from entropy_explore_env.settings import Grid, RangeSensor, gaussian_entropy_bits
+from entropy_explore_env.settings.ending import gaussian_entropy_bits
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.viewpoints.evaluation import robot_model
 from tests.reference import rocha04
 from tests.reference.scenes import as_reference, free_box, put, random_actions, started, wander

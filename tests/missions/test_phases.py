@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
-from entropy_explore_env.channel_settings import Channel
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.state_values import state_digest
-from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.channel import Channel
 from tests.reference.scenes import free_box, started, wander
 
 NO_ANNOUNCEMENTS = {"announcements": False, "i_min_bits": 0.0}

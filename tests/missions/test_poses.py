@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.missions.poses import driven_metres, place_at, pose_at, speed_at, within_grid
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from tests.reference.scenes import free_box, started
 
 GRID = Grid((7, 11, 5), 0.5, (-1.0, 2.0, 0.5))

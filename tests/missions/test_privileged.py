@@ -13,8 +13,9 @@ from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.privileged import PRIVILEGED, privileged_numbers
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import find_scenario
 
 COLUMN = {number.name: place for place, number in enumerate(PRIVILEGED)}
 

@@ -7,7 +7,6 @@ import pickle
 import numpy as np
 import pytest
 
-from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import ActionError, RecordError
 from entropy_explore_env.missions.snapshot import restore, snapshot
@@ -18,8 +17,10 @@ from entropy_explore_env.planner.candidate_features import COLUMNS, CONTEXT, FEA
 from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.randomness import Stream, splitmix_states
 from entropy_explore_env.reports.state_values import state_digest
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.action import Action
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.observation import Observation
 from tests.missions.replays import check_replay
 from tests.reference.scenes import free_box, random_actions, started, wander
 

@@ -14,7 +14,7 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import PROGRESS, MissionEnd
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import drawn, free_box, put, random_actions, seeds, started, wander
 

@@ -17,9 +17,10 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.tick import step_missions
 from entropy_explore_env.robots.range_sensor import Return
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import ROOM, ROOM_FURNISHED
-from entropy_explore_env.settings import Grid, gaussian_entropy_bits
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.ending import gaussian_entropy_bits
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import ROOM, ROOM_FURNISHED
 from tests.reference import rocha04
 from tests.reference.scenes import as_arrays, free_box, random_actions, started, wander
 

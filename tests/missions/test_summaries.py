@@ -17,7 +17,7 @@ from entropy_explore_env.missions.summaries import precision_of_place
 from entropy_explore_env.reports.state_values import state_digest
 from entropy_explore_env.robots.localization import pack_covariance
 from entropy_explore_env.robots.map_summary import decode_map, encode_map, is_summary
-from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.settings.changes import with_settings
 from tests.reference.scenes import drawn, free_box, random_actions, seeds, started, wander
 
 QUIET = {"announcements": False}

@@ -14,7 +14,7 @@ from entropy_explore_env.missions.state import LatestScans
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.range_sensor import Return
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference import rocha04
 from tests.reference.scenes import build, free_box, put, random_actions, started, wander

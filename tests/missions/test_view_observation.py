@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.pooling import Pool, fresh_sums, new_cells, pool_belief
-from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view_observation import ViewObserver
+from entropy_explore_env.settings.action import Action
+from entropy_explore_env.settings.observation import Observation
 
 EVERYTHING = Observation(
     flat=True,

@@ -15,9 +15,9 @@ from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_frontiers import BLOCK, VoxelFrontiers
 from entropy_explore_env.missions.view import TeammateView
 from entropy_explore_env.planner.frontier_rule import Scene
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import find_scenario
 from tests.reference import explorers as reference
 
 

@@ -11,7 +11,6 @@ from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
 from entropy_explore_env.belief.paths.planning import shortest_path
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.belief.visibility import CONE
-from entropy_explore_env.localization_settings import Localization
 from entropy_explore_env.planner.candidate_features import COLUMNS
 from entropy_explore_env.planner.memory import chosen_number, learn, trust_in, weigh_time
 from entropy_explore_env.planner.model import Situation, new_proposers
@@ -21,9 +20,11 @@ from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE, KNOWLEDGE
 from entropy_explore_env.planner.thresholds import REMEMBERED_EDGES
 from entropy_explore_env.planner.views import clear_marks, look_from, mark_view
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX
-from entropy_explore_env.settings import Grid, RangeSensor
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.localization import Localization
+from entropy_explore_env.settings.scenarios import BOX
+from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.viewpoints.evaluation import line_is_free, new_scratch, robot_model
 from entropy_explore_env.viewpoints.expected_scan import expected_bits
 from tests.reference.scenes import drawn, free_box, put, random_belief, seeds, started

@@ -15,12 +15,13 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.frontiers.terrain_frontiers import TerrainFrontiers
-from entropy_explore_env.localization_settings import Localization
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import CLIFF, find_scenario
-from entropy_explore_env.settings import Grid, Robot
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.localization import Localization
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.scenarios import CLIFF, find_scenario
 from tests.reference.scenes import free_box, put, started
 
 DRIFT = {"xy_m_per_sqrt_m": 0.02, "yaw_rad_per_sqrt_m": 0.01, "yaw_rad_per_sqrt_rad": 0.01}

@@ -12,8 +12,8 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.explorer import PlannedRate, explores_frontiers
 from entropy_explore_env.planner.tour import SharedTour, Tour
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import OFFICE, find_scenario
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import OFFICE, find_scenario
 from tests.planner.scenes import cell, mate, random_plan, scene_of, small_plan, with_mates
 from tests.reference import explorers as reference
 from tests.reference.scenes import drawn, seeds

@@ -18,9 +18,9 @@ from entropy_explore_env.planner.nearby import propose_nearby, start_paths
 from entropy_explore_env.planner.recipe import ALL_AROUND, NARROW_PLANNED, NARROW_STRAIGHT
 from entropy_explore_env.planner.records import EXPERIENCE, KNOWLEDGE, MATE, Kind
 from entropy_explore_env.planner.states import PlannerState
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX, OFFICE
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import BOX, OFFICE
 
 ACTION = {"kind": "candidates", "candidates": 1}
 PLAN = with_settings(

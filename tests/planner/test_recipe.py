@@ -11,7 +11,7 @@ from entropy_explore_env.planner.recipe import (
     angular_spread,
     recipe_for,
 )
-from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.settings.scenarios import SCENARIOS
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.explorer import PlannedRate
 from entropy_explore_env.planner.candidate_features import COLUMNS, FEATURES
 from entropy_explore_env.planner.weights import PlannerWeights, read_weights, shipped_weights
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import find_scenario
 
 SCENARIO = with_settings(find_scenario("box-7x11x5"), {"robots": 2, "ending": {"time_limit_s": 12.0}})
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.settings import RangeSensor, centred_angles
+from entropy_explore_env.settings.sensor import RangeSensor, centred_angles
 from tests.reference import rocha04
 
 Voxel = tuple[int, int, int]

@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 UNKNOWN, FREE, WALL = -1, 0, 1
 Cell = tuple[int, int]

@@ -16,13 +16,14 @@ from hypothesis import strategies as st
 from entropy_explore_env.belief.raycast import Crossing, longest_crossing
 from entropy_explore_env.missions.observation.layout import action_count
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import BOX
 from tests.reference import rocha04
 
 SMALL = ("room", "room-furnished", "box-7x11x5")
 """Scenarios that tests walk through for whole episodes, with teams and actions of all kinds: small enough for
-seconds a test. The others are walked through for a few steps, in tests/test_scenarios.py."""
+seconds a test. The others are walked through for a few steps, in tests/settings/test_scenarios.py."""
 SHAPES = ((7, 11, 5), (3, 8, 6), (9, 6, 1), (13, 2, 4), (1, 10, 3))
 
 

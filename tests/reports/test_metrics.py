@@ -10,8 +10,8 @@ import pytest
 
 from entropy_explore_env.missions.state import COUNTED, MissionEnd
 from entropy_explore_env.reports.metrics import information_floor, joint_figures, mission_figures
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import ROOM
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import ROOM
 from tests.reference.scenes import free_box, started, wander
 
 SUMS = {

@@ -34,7 +34,7 @@ from entropy_explore_env.reports.state_values import (
     state_values,
     value_bytes,
 )
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.worlds.load import save_world, world_bytes
 from entropy_explore_env.worlds.world import World

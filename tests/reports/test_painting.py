@@ -20,7 +20,7 @@ from entropy_explore_env.reports.painting import (
 )
 from entropy_explore_env.reports.recording import poses_now
 from entropy_explore_env.reports.rendering import Frame, draw_frame
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box, random_actions, started, wander
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.reports.recording import DrivenPaths, Recorder, poses_now
-from entropy_explore_env.settings import Robot, RobotKind
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.robot_kind import RobotKind
 from tests.reference.scenes import free_box, random_actions, started
 
 

@@ -14,9 +14,9 @@ from entropy_explore_env.reports import rerun_view
 from entropy_explore_env.reports.painting import entropy_share, remaining_share
 from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.reports.rerun_view import RerunView, cone_edges, shared_ends_m
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import ROOM_FURNISHED
-from entropy_explore_env.settings import RangeSensor
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import ROOM_FURNISHED
+from entropy_explore_env.settings.sensor import RangeSensor
 from tests.reference.scenes import free_box, random_actions, started
 
 

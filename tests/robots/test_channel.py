@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.channel_settings import Signal
 from entropy_explore_env.robots.channel import (
     BITS_PER_ANNOUNCEMENT,
     BITS_PER_BATCH,
@@ -22,6 +21,7 @@ from entropy_explore_env.robots.channel import (
     select_measurements,
     steered_i_min,
 )
+from entropy_explore_env.settings.channel import Signal
 from tests.reference import rocha04
 from tests.reference.scenes import drawn, ray_space, seeds
 

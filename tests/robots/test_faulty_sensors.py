@@ -8,7 +8,8 @@ import pytest
 from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.robots.faults import FAULT_PARAMS, drop_scan, spoil_scan
 from entropy_explore_env.robots.range_sensor import Scene, SensorPose, new_scan, sensor_model, take_scan
-from entropy_explore_env.settings import Grid, RangeSensor
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.sensor import RangeSensor
 
 GRID = Grid((7, 11, 5), 0.5)
 SENSOR = RangeSensor(field_of_view_rad=(0.6, 0.2), angular_step_rad=0.1, voxels_behind=1)

@@ -18,7 +18,8 @@ from entropy_explore_env.robots.range_sensor import (
     take_scan,
     true_coverage,
 )
-from entropy_explore_env.settings import Grid, RangeSensor
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.sensor import RangeSensor
 
 SIZE, EDGE_M = (7, 11, 5), 0.5
 WIDE = RangeSensor((2.0 * math.pi, math.pi / 2), math.pi / 9, max_range_m=2.6)

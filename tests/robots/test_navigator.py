@@ -21,7 +21,7 @@ from entropy_explore_env.robots.motion import (
     time_after,
 )
 from entropy_explore_env.robots.navigator import lattice_of, new_navigator, plan_path
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import drawn, free_box, ray_space, seeds
 

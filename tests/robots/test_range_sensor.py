@@ -23,7 +23,8 @@ from entropy_explore_env.robots.range_sensor import (
     true_coverage,
     visibility_parameters,
 )
-from entropy_explore_env.settings import Grid, RangeSensor
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.sensor import RangeSensor
 from tests.reference import rocha04
 from tests.reference.scenes import SHAPES, as_reference, drawn, flat_index, random_belief, random_cover, seeds
 

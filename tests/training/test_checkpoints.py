@@ -17,13 +17,13 @@ from baselines.experiments.mission import run_mission
 from baselines.run import main as run_main
 from baselines.strategies import make_strategy
 from entropy_explore_env.command import BAD_INPUT
-from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.planner.weights import PlannerWeights
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.observation import Observation
+from entropy_explore_env.settings.scenarios import find_scenario
 from training import evaluate
 from training.advantages import Normaliser
 from training.checkpoints import (

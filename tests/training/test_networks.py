@@ -14,8 +14,9 @@ from torch.distributions import Categorical
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.observation.layout import ObservationLayout
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import find_scenario
 from training.advantages import Normaliser
 from training.checkpoints import PolicySettings
 from training.networks import GazeHeads, MapFeatures, MoveAndGaze, Tanh, VectorFeatures, policy_keywords

@@ -11,9 +11,9 @@ from PIL import Image
 from baselines.cli.arguments import run_command
 from baselines.experiments.rows import read_table
 from entropy_explore_env.command import BAD_INPUT
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX
-from entropy_explore_env.settings_json import settings_json
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.json import settings_json
+from entropy_explore_env.settings.scenarios import BOX
 from training import evaluate, ppo
 from training.checkpoints import latest_checkpoint, load_checkpoint
 

@@ -24,7 +24,7 @@ from baselines.cli.interruption import Interruption
 from baselines.experiments.mission import Surroundings
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
-from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.settings.scenarios import SCENARIOS
 from tests.systems import needs_posix
 from training import ppo
 from training.advantages import DecisionBuffer

@@ -10,8 +10,8 @@ from scipy import stats
 
 from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.missions.view import RobotView, view_of
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenario import Scenario
 from tests.reference.scenes import free_box, put, started
 
 HALL = Grid((21, 33, 17), 0.5, (-3.0, 2.0, 0.5))

@@ -11,8 +11,8 @@ from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
 from entropy_explore_env.belief.paths.search import new_search
-from entropy_explore_env.scenarios import BOX
-from entropy_explore_env.settings import RangeSensor
+from entropy_explore_env.settings.scenarios import BOX
+from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.viewpoints.evaluation import (
     DriveModel,
     line_is_free,

@@ -12,7 +12,7 @@ import pytest
 from benchmarks.proofs.world_samples import pgm, sketch
 from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldError, WorldWarning
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.given import (
     GIVEN,
     distinct_names,

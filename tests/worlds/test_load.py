@@ -16,8 +16,8 @@ from benchmarks.proofs.world_samples import npz, pgm, samples, sketch
 from entropy_explore_env import EntropyExploreEnv, EntropyExploreVectorEnv
 from entropy_explore_env.envs.episodes import require_same, snapshot
 from entropy_explore_env.errors import SettingError, WorldError
-from entropy_explore_env.scenarios import BOX
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import BOX
 from entropy_explore_env.worlds.files.process import kept_reader
 from entropy_explore_env.worlds.formats import FORMATS
 from entropy_explore_env.worlds.load import (

@@ -9,7 +9,7 @@ from entropy_explore_env import EntropyExploreVectorEnv, parallel_env
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.randomness import Stream, generator
-from entropy_explore_env.scenarios import BOX, ROOM_FURNISHED, find_scenario
+from entropy_explore_env.settings.scenarios import BOX, ROOM_FURNISHED, find_scenario
 from entropy_explore_env.worlds.load import make_world, with_world, world_from_file, world_with_number
 from entropy_explore_env.worlds.splits import draw_world_number
 from tests.reference.scenes import free_box

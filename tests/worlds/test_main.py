@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.proofs.world_samples import heights, npz, pgm, sketch
 from entropy_explore_env.command import run_command
-from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.settings.scenarios import SCENARIOS
 from entropy_explore_env.worlds.__main__ import main
 from entropy_explore_env.worlds.formats import FORMATS
 from entropy_explore_env.worlds.load import load_world, make_world

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.pictures import (
     _FREE,
     _SOLID,

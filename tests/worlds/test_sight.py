@@ -7,9 +7,9 @@ import pytest
 
 from entropy_explore_env.missions.reset_options import ResetOptions
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import SCENARIOS
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import SCENARIOS
 from entropy_explore_env.worlds.given import in_given_worlds
 from entropy_explore_env.worlds.sight import _is_open, visible_from
 from entropy_explore_env.worlds.world import World

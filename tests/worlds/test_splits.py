@@ -11,8 +11,9 @@ import pytest
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.randomness import Stream, generator
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import BHATTACHARYA_OFFICE, ROOM_FURNISHED
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import BHATTACHARYA_OFFICE, ROOM_FURNISHED
 from entropy_explore_env.worlds import splits
 from entropy_explore_env.worlds.load import make_world, world_with_number
 from entropy_explore_env.worlds.splits import WORLD_NUMBERS, draw_world_number, world_generator

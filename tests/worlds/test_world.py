@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.settings import Grid, Robot
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.worlds.world import Collision, World, no_fly_mask
 from tests.reference.scenes import drawn, free_box, random_cover, seeds
 

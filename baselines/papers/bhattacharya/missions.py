@@ -14,8 +14,8 @@ from baselines.experiments.rows import Record
 from baselines.experiments.statistics import ratio_interval
 from baselines.experiments.tables import markdown_table
 from baselines.experiments.trials import Cell
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import find_scenario
 
 FLYING = ("voronoi", "voronoi-nearest", "gradient", "planned-rate")
 FLYING_LIMIT_S = 600.0

@@ -14,9 +14,9 @@ from baselines.experiments.rows import Record
 from baselines.experiments.trials import described
 from baselines.papers.bhattacharya.simulation.team import Rules, Simulation, Trace
 from entropy_explore_env.belief.paths.geodesic_cells import new_tessellation, tessellate
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import find_scenario
 from entropy_explore_env.worlds.load import make_world
 
 SNAPSHOTS = 6

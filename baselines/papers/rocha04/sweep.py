@@ -8,8 +8,9 @@ from typing import Any
 
 from baselines.experiments.experiment import Amount
 from baselines.experiments.trials import Cell, CellTrial, trials_of
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import ROOM
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import ROOM
 
 TEAMS = (2, 3, 4)
 BURSTS = (32, 64, 128)

@@ -12,8 +12,9 @@ from baselines.experiments.rows import Record
 from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.papers.rochami.mission import Run
 from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import LAB, ROOM
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import LAB, ROOM
 
 TEAMS = tuple(range(2, 11))
 FEW = (2, 4, 8)

@@ -22,7 +22,7 @@ from baselines.strategies.metrics import ExplorationConfig
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 MARKS = (0.5, 0.9, 0.95, 0.99)
 """Explored shares at which the time is taken."""

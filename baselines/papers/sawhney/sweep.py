@@ -20,8 +20,9 @@ from baselines.papers.sawhney.terrain_model import JACKSBORO
 from baselines.strategies.metrics import Coordinated, ExplorationConfig, Metric, Nearest
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import find_scenario
 
 PLANS = ("office", "corridor", "cluttered", "hybrid")
 TERRAINS = ("terrain-smooth", "terrain", "terrain-rough")

@@ -32,7 +32,7 @@ from baselines.strategies.next_best_view.ground_map import WHEEL_M
 from baselines.strategies.next_best_view.plateau_rule import PlateauRule
 from entropy_explore_env.belief.elevation import completed
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.scenarios import CLIFF
+from entropy_explore_env.settings.scenarios import CLIFF
 from entropy_explore_env.worlds.load import make_world
 
 _SHOWN = ((1, STEPS), (3, MORE), (5, FEW))

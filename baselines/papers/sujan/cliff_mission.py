@@ -16,8 +16,9 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import CLIFF
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import CLIFF
 
 METHODS = {
     1: "cliff-raster-fixed-yaw",

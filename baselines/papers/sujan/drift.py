@@ -20,10 +20,11 @@ from baselines.experiments.tables import markdown_table
 from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.strategies import make_strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.localization_settings import Localization
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import CLUTTERED
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.localization import Localization
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import CLUTTERED
 
 STRATEGIES = {
     "gradient": "Rocha04",

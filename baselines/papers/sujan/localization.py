@@ -21,9 +21,10 @@ from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.papers.sujan.planar import METHODS, at_end, in_the_middle, scenario_of
 from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.localization_settings import Localization
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.scenario import Scenario, with_settings
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.localization import Localization
+from entropy_explore_env.settings.scenario import Scenario
 
 DRIFT = Localization(xy_m_per_sqrt_m=0.02, yaw_rad_per_sqrt_m=0.002, yaw_rad_per_sqrt_rad=0.002)
 """Ours: after 100 m the standard deviation of x, and that of y, is 0.2 m, and that of the yaw 1.1°."""

@@ -24,8 +24,9 @@ from baselines.strategies import make_strategy
 from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import OCCLUSIONS
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import OCCLUSIONS
 
 METHODS = {
     "i": "random-known",

@@ -23,8 +23,8 @@ from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.map_summary import decode_map, encode_map, tree_bits
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import find_scenario
 
 MAKERS = {"occlusions": "nearest-frontier", "office": "nearest-frontier", "terrain": "random"}
 """Scenario → what one robot maps it by."""

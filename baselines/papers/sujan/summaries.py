@@ -22,8 +22,8 @@ from baselines.strategies import make_strategy
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import find_scenario
 
 
 class Task(NamedTuple):

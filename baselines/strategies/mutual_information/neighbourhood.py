@@ -12,9 +12,9 @@ from entropy_explore_env.belief.paths.lattice import new_lattice
 from entropy_explore_env.belief.raycast import Crossing, longest_crossing
 from entropy_explore_env.belief.visibility import CONE, Occlusion, mark_cone
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, announced_cone, belief_of
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import gaussian_entropy_bits
-from entropy_explore_env.validation import check, check_kind, check_not_negative, check_positive
+from entropy_explore_env.settings.ending import gaussian_entropy_bits
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.validation import check, check_kind, check_not_negative, check_positive
 from entropy_explore_env.viewpoints.gradient_candidates import CANDIDATE, find_gradient_candidates
 
 _LEAST_RADIUS_M = 0.5

@@ -20,7 +20,7 @@ from entropy_explore_env.frontiers.knowledge import RobotKnowledge, belief_of
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import NOWHERE, Goal, Scene
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import robot_model
 
 _LARGEST_OCCUPANCY = 0.05

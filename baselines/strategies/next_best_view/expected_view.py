@@ -15,7 +15,8 @@ from entropy_explore_env.belief.elevation import completed
 from entropy_explore_env.belief.fields import Belief, occupancy_probability
 from entropy_explore_env.belief.raycast import OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.settings import Grid, RangeSensor
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.sensor import RangeSensor
 
 LEVELS = 20
 """Intervals of occupancy, and of stretched occupancy, whose histograms are taken."""

@@ -22,7 +22,7 @@ from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.driver import Driver, Trail
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 STEEP_RAD = math.radians(60.0)
 """Poses look down by at most this, and so does the first look around."""

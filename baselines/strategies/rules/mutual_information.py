@@ -26,7 +26,7 @@ from baselines.strategies.mutual_information.neighbourhood import MutualInformat
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, random_viewpoint
 from entropy_explore_env.planner.driver import Driver, Trail
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 _ALIKE_RAD = math.radians(15.0)
 _MEMORY = 8

@@ -28,7 +28,7 @@ from baselines.strategies.next_best_view.localization_error import localization_
 from baselines.strategies.next_best_view.rating import UNCERTAINTY, new_information, pose_distance
 from entropy_explore_env.frontiers.knowledge import voxel_of
 from entropy_explore_env.planner.scene import Scene
-from entropy_explore_env.validation import check_choice, check_count, check_kind, check_within
+from entropy_explore_env.settings.validation import check_choice, check_count, check_kind, check_within
 
 Measure = Literal["uncertainty", "stretched", "linear"]
 

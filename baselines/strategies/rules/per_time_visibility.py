@@ -40,7 +40,7 @@ from entropy_explore_env.frontiers.terrain_frontiers import TerrainFrontiers
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import ROOM, STAY, Scene
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 
 class PerTimeVisibility(FrontierRule):

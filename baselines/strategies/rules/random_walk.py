@@ -6,7 +6,7 @@ import numpy as np
 
 from entropy_explore_env.frontiers.knowledge import random_viewpoint
 from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 
 class RandomWalk:

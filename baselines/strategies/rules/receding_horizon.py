@@ -20,7 +20,7 @@ import numpy as np
 
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import Scene, best_of
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 _DECAY = 8.0
 """λ, for each sensor range; tuned: see docs/explorers.md."""

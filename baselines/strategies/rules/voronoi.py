@@ -27,7 +27,7 @@ from entropy_explore_env.belief.paths.geodesic_cells import UNREACHED
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
 from entropy_explore_env.planner.driver import Driver
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 Control = Literal["projected-centroid", "gradient-search", "nearest"]
 _LENGTH_COST = 0.01

@@ -21,7 +21,7 @@ from entropy_explore_env.frontiers.knowledge import (
     teammates_that_share,
     voxel_of,
 )
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import (
     RobotModel,
     line_is_free,

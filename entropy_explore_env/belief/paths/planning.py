@@ -50,7 +50,7 @@ from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.validation import is_whole
+from entropy_explore_env.settings.validation import is_whole
 
 ANY_GOAL = -1
 """As a goal: paths to all voxels are wanted."""

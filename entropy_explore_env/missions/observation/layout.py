@@ -50,7 +50,7 @@ from entropy_explore_env.missions.observation.patch import PATCH_CHANNELS
 from entropy_explore_env.missions.observation.team import TEAMMATE_VALUES
 from entropy_explore_env.missions.rules import Rules, overview_shape, rules_of
 from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 _Space = TypeVar("_Space", bound=spaces.Space)
 

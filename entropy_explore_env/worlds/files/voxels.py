@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.settings import MAX_VOXELS_ALONG_AXIS
+from entropy_explore_env.settings.grid import MAX_VOXELS_ALONG_AXIS
 
 UNKNOWN, FREE, SOLID, UNREADABLE = -1, 0, 1, 2
 """Labels of voxels; those unreadable are solid, too, and give no return to a range sensor."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.recipes.connectivity import fill_pockets
 from entropy_explore_env.worlds.recipes.convex import scatter
 from entropy_explore_env.worlds.recipes.plan import Plan, Rectangle, bare_plan, extruded, require_size, voxels

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.recipes.bhattacharya_cluttered import bhattacharya_cluttered
 from entropy_explore_env.worlds.recipes.bhattacharya_office import bhattacharya_office
 from entropy_explore_env.worlds.recipes.cave import cave

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse.csgraph import minimum_spanning_tree
 
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.recipes.connectivity import fill_pockets
 from entropy_explore_env.worlds.recipes.fractal import fractal_noise
 from entropy_explore_env.worlds.recipes.plan import BODY_RADIUS_M, require_size

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.recipes.fractal import fractal_noise
 from entropy_explore_env.worlds.recipes.plan import require_size
 from entropy_explore_env.worlds.recipes.rocks import VIKING_2, RockSizes, draw_diameters, raise_rocks

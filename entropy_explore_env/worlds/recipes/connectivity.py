@@ -8,7 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.components import connected_components, largest_component
 from entropy_explore_env.worlds.recipes.plan import BODY_RADIUS_M, passage_voxels
 from entropy_explore_env.worlds.world import Collision, World

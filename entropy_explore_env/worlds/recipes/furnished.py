@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.components import connected_components
 from entropy_explore_env.worlds.world import World
 

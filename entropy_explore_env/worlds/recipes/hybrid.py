@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.components import largest_component
 from entropy_explore_env.worlds.recipes.cluttered import cluttered_plan
 from entropy_explore_env.worlds.recipes.connectivity import body_room, cut_gates, fill_pockets

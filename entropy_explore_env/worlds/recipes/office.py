@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.recipes.furniture import OFFICE, furnish
 from entropy_explore_env.worlds.recipes.plan import (
     Plan,

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 
 BODY_RADIUS_M = 0.3
 """The body for which recipes promise connected free space."""

@@ -8,10 +8,10 @@ from matplotlib.figure import Figure
 
 from baselines.cli import mission_picture as pictures
 from baselines.cli.mission_picture import mission_picture
-from entropy_explore_env.localization_settings import Fiducials
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.recording import Recorder, believed_poses_now, poses_now
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.fiducials import Fiducials
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box, random_actions, started
 

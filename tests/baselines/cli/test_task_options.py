@@ -18,9 +18,9 @@ from baselines.cli.task_options import TaskOptions, base_task, options_for, sett
 from baselines.experiments.mission import Surroundings, run_mission, scripted_env
 from baselines.strategies import make_strategy
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX, find_scenario
-from entropy_explore_env.settings_json import settings_of
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.json import settings_of
+from entropy_explore_env.settings.scenarios import BOX, find_scenario
 
 
 @pytest.fixture

@@ -14,8 +14,8 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import ActionError
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import BOX
 
 
 class Noting:

@@ -14,8 +14,8 @@ import pytest
 from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.trials import Cell, How, run_cells
 from baselines.experiments.worker_pool import run_each
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import BOX
 
 ray = pytest.importorskip("ray", reason="ray is not installed: pip install 'entropy_explore_env[cluster]'")
 

@@ -22,8 +22,8 @@ from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.trials import Cell, How, run_cells
 from baselines.experiments.worker_pool import Failure, run_each
 from entropy_explore_env.errors import MissingExtraError, SettingError
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import BOX
 
 ray = pytest.importorskip("ray", reason="ray is not installed: pip install 'entropy_explore_env[cluster]'")
 

@@ -28,8 +28,8 @@ from baselines.experiments.trials import (
     trials_of,
 )
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX, OFFICE
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import BOX, OFFICE
 
 SHORT = with_settings(BOX, {"time_limit_s": 20.0})
 CELLS = (Cell("walk", SHORT, "random", 3), Cell("steep", SHORT, "gradient", 2))

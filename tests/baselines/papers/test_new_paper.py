@@ -20,8 +20,8 @@ from tests.baselines.papers.pages import run_paper
 SWEEP = """
 from baselines.experiments.experiment import Amount
 from baselines.experiments.trials import Cell, CellTrial, trials_of
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import BOX
 
 def experiment(amount: Amount) -> list[CellTrial]:
     cells = []

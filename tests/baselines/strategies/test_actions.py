@@ -12,7 +12,7 @@ from baselines.strategies.protocol import choose_all
 from entropy_explore_env.missions.action import action_space, decode_action
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from tests.reference.scenes import free_box, started
 
 ROUNDING = 2.0**-22

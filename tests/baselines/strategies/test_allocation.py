@@ -16,9 +16,9 @@ from entropy_explore_env.frontiers.knowledge import under_way
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import driving_time
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX, find_scenario
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import BOX, find_scenario
 from tests.reference import sawhney as reference
 from tests.reference.scenes import build, build_known, free_box, put, started
 

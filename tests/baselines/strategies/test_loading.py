@@ -16,8 +16,8 @@ from baselines.strategies import STRATEGIES, make_strategy, strategy_module
 from baselines.strategies.rules.gradient import GradientStrategy
 from entropy_explore_env.errors import ActionError, SettingError
 from entropy_explore_env.planner.frontier_rule import PickRule
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import BOX
 from tests.code_blocks import shown_files
 
 ROOT = Path(__file__).parents[3]

@@ -10,9 +10,9 @@ from baselines.strategies import make_strategy
 from baselines.suites.faults import STRATEGIES
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.state import MissionEnd
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import OFFICE
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import OFFICE
 from entropy_explore_env.worlds.world import World
 
 GRID = Grid((61, 87, 1), 0.1)

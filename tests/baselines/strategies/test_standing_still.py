@@ -20,9 +20,10 @@ from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from baselines.suites.bundled_worlds import WORLDS
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import CAVE, OFFICE
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import CAVE, OFFICE
 from entropy_explore_env.worlds.load import load_world
 from entropy_explore_env.worlds.world import World
 

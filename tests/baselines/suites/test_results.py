@@ -13,8 +13,8 @@ from baselines.experiments.trials import CellTrial
 from baselines.suites.page import shown, write_page
 from baselines.suites.results import Results, failed_rows, overall_rows, results_of, task_rows
 from baselines.suites.suite import PATH, TIME, Place, Suite, Task
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import BOX
 
 
 def results_of_times(times: dict[str, list[list[float | str | None]]]) -> Results:

@@ -13,7 +13,7 @@ from baselines.suites.bundled_worlds import WORLDS
 from baselines.suites.page import about
 from entropy_explore_env import load_world
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenarios import SCENARIOS
+from entropy_explore_env.settings.scenarios import SCENARIOS
 
 TEAMS = ("random", "gradient")
 NAMES = {

@@ -22,7 +22,7 @@ from entropy_explore_env.belief.paths.planning import (
 )
 from entropy_explore_env.belief.paths.search import costs_to_all, new_search
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import SHAPES, drawn, flat_index, random_cover, seeds
 

@@ -12,15 +12,16 @@ from benchmarks.proofs.cases import BrokenPromiseError, Found, play_cases
 from benchmarks.proofs.drawn_scenarios import FIELDS, Numbers, draw_scenario
 from benchmarks.proofs.settings import WATCHDOG_S, check, play
 from entropy_explore_env import EntropyExploreEnv
-from entropy_explore_env.channel_settings import Channel
-from entropy_explore_env.decision_settings import Observation
 from entropy_explore_env.errors import EntropyExploreError
-from entropy_explore_env.fault_settings import Outage, RadioFault, SensorFault
-from entropy_explore_env.localization_settings import Fiducials
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.scenarios import BOX
-from entropy_explore_env.settings import RangeSensor, Robot
-from entropy_explore_env.settings_json import settings_of
+from entropy_explore_env.settings.channel import Channel
+from entropy_explore_env.settings.faults import Outage, RadioFault, SensorFault
+from entropy_explore_env.settings.fiducials import Fiducials
+from entropy_explore_env.settings.json import settings_of
+from entropy_explore_env.settings.observation import Observation
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import BOX
+from entropy_explore_env.settings.sensor import RangeSensor
 
 DRAWN_OTHERWISE = {
     RangeSensor: {"field_of_view_rad", "angular_step_rad"},

@@ -10,7 +10,7 @@ import torch
 from benchmarks.proofs import training
 from benchmarks.proofs.cases import BrokenPromiseError
 from benchmarks.proofs.training import check_curve, check_policy, train
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.scenarios import BOX
 from tests.systems import needs_posix
 from training.checkpoints import Checkpoint, PolicySettings, checkpoint_name, save_checkpoint
 

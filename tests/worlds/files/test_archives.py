@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from benchmarks.proofs.world_samples import npz, saved_world
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.load import load_world, save_world
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import SHAPES, drawn, random_cover, seeds

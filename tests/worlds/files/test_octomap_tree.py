@@ -12,7 +12,7 @@ from benchmarks.proofs.world_samples import octomap_bytes
 from entropy_explore_env.command import READ_MEMORY_VARIABLE, allow_read_memory
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.scenarios import BOX
 from entropy_explore_env.worlds.files import octomap_tree, process
 from entropy_explore_env.worlds.files.process import kept_reader
 from entropy_explore_env.worlds.files.resampling import resampled

@@ -9,8 +9,8 @@ import pytest
 from scipy import ndimage
 
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.scenarios import SCENARIOS
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import SCENARIOS
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 
 BODY_M = 0.3

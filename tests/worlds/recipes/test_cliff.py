@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.scenarios import CLIFF
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import CLIFF
 from entropy_explore_env.worlds.load import make_world
 from entropy_explore_env.worlds.recipes.cliff import PLATEAU_M, cliff
 from entropy_explore_env.worlds.recipes.rocks import (

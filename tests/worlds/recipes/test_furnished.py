@@ -7,8 +7,8 @@ import pytest
 from scipy import ndimage
 
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.scenarios import BOX, ROOM
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import BOX, ROOM
 from entropy_explore_env.worlds.recipes.empty import empty
 from entropy_explore_env.worlds.recipes.furnished import furnished
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import ndimage
 
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.recipes.furniture import LABORATORY, OFFICE, Piece, furnish
 from entropy_explore_env.worlds.recipes.plan import Rectangle, bare_plan
 from entropy_explore_env.worlds.world import World

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from entropy_explore_env.scenarios import (
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import (
     BHATTACHARYA_CLUTTERED,
     BHATTACHARYA_OFFICE,
     CAVE,
@@ -16,7 +17,6 @@ from entropy_explore_env.scenarios import (
     LAB,
     OCCLUSIONS,
 )
-from entropy_explore_env.settings import Grid
 from entropy_explore_env.worlds.recipes.bhattacharya_cluttered import bhattacharya_cluttered
 from entropy_explore_env.worlds.recipes.bhattacharya_office import bhattacharya_office
 from entropy_explore_env.worlds.recipes.cave import cave

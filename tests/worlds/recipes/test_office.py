@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from entropy_explore_env.scenarios import OFFICE, OFFICE_3D
+from entropy_explore_env.settings.scenarios import OFFICE, OFFICE_3D
 from entropy_explore_env.worlds.recipes.office import office, office_plan
 from entropy_explore_env.worlds.world import World
 

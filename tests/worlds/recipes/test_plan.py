@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.recipes.plan import (
     Rectangle,
     bare_plan,

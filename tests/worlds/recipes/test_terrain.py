@@ -7,8 +7,8 @@ import pytest
 
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.scenarios import TERRAIN
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import TERRAIN
 from entropy_explore_env.worlds.recipes.terrain import exposure_surface, terrain
 from tests.reference.scenes import wander
 

@@ -26,7 +26,7 @@ from entropy_explore_env.belief.raycast import (
     point,
 )
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.validation import check, check_kind
+from entropy_explore_env.settings.validation import check, check_kind
 
 BITS_PER_CELL = 64
 """A cell in a message: its number, and what was read of it, 32 bits each."""

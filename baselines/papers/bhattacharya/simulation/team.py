@@ -37,7 +37,13 @@ from entropy_explore_env.belief.paths.geodesic_cells import (
     tessellate,
 )
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.validation import check, check_choice, check_count, check_kind, check_not_negative
+from entropy_explore_env.settings.validation import (
+    check,
+    check_choice,
+    check_count,
+    check_kind,
+    check_not_negative,
+)
 
 Control = Literal["projected-centroid", "gradient-search", "nearest"]
 Metric = Literal["entropy", "length"]

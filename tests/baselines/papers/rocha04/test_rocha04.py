@@ -7,8 +7,8 @@ import pytest
 from baselines.experiments.trials import CellTrial
 from baselines.papers.rocha04 import EXPERIMENT, sweep
 from baselines.papers.rocha04.sweep import ALTERNATIVES, BURSTS, CHANGES, I_MINS, TEAMS, team_id
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX, ROOM
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import BOX, ROOM
 from tests.baselines.papers.pages import cells_of, run_paper
 
 

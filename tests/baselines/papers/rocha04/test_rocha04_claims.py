@@ -17,8 +17,8 @@ from baselines.papers.rocha04 import EXPERIMENT
 from baselines.papers.rocha04.claims import all_claims
 from baselines.papers.rocha04.sweep import BURSTS, I_MINS, TEAMS, team_id
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import ROOM
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import ROOM
 from tests.baselines.papers.pages import cells_of
 
 

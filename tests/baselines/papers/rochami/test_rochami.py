@@ -29,8 +29,8 @@ from baselines.papers.rochami.sweep import (
     sharing_id,
 )
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import BOX
 from tests.baselines.papers.pages import cells_of, run_paper
 from tests.reference import rochami as reference
 from tests.reference.scenes import as_reference

@@ -29,8 +29,8 @@ from baselines.papers.sawhney.sweep import (
 from baselines.papers.sawhney.terrain_model import JACKSBORO, model_file
 from baselines.strategies.metrics import ExplorationConfig, Metric, Nearest
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.load import load_world
 from tests.baselines.papers.pages import cells_of, run_paper
 

@@ -19,7 +19,7 @@ from baselines.papers.sujan.summaries import (
     summary_id,
 )
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.scenario import with_settings
+from entropy_explore_env.settings.changes import with_settings
 from tests.baselines.papers.pages import cells_of, run_paper
 from tests.reference.scenes import free_box
 

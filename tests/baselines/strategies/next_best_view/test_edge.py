@@ -9,7 +9,7 @@ import pytest
 from scipy import ndimage
 
 from baselines.strategies.next_best_view.edge import behind_line, find_edge, inside_polygon
-from entropy_explore_env.scenarios import CLIFF
+from entropy_explore_env.settings.scenarios import CLIFF
 from entropy_explore_env.worlds.load import make_world
 
 

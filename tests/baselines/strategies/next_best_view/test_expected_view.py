@@ -20,9 +20,10 @@ from baselines.strategies.next_best_view.expected_view import (
 from baselines.strategies.next_best_view.rating import UNCERTAINTY, new_information
 from entropy_explore_env.belief.elevation import completed
 from entropy_explore_env.belief.fields import Belief, occupancy_probability
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.settings import Grid, RangeSensor
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import find_scenario
+from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.viewpoints.evaluation import robot_model
 from tests.reference import rocha04, sujan
 from tests.reference.scenes import drawn, seeds

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from baselines.strategies.next_best_view.ground_map import safe_columns
-from entropy_explore_env.scenarios import CLIFF
+from entropy_explore_env.settings.scenarios import CLIFF
 from entropy_explore_env.worlds.load import make_world
 from entropy_explore_env.worlds.world import Collision
 

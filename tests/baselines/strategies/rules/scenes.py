@@ -7,9 +7,9 @@ import numpy as np
 from baselines.strategies.protocol import Strategy
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import RobotView, view_of
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import find_scenario
 
 
 def missions_of(**settings: object) -> Missions:

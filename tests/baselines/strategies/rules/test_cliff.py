@@ -15,8 +15,8 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import CLIFF, LAB
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import CLIFF, LAB
 from tests.reference import sujan
 
 QUICK = {"sensor": {"angular_step_rad": math.pi / 60}, "robot": {"reach_m": math.inf}}

@@ -6,8 +6,8 @@ import math
 
 from baselines.experiments.mission import run_mission, scripted_env
 from baselines.strategies import make_strategy
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import CLIFF
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import CLIFF
 
 QUICK = {"sensor": {"angular_step_rad": math.pi / 60}, "robot": {"reach_m": math.inf}}
 

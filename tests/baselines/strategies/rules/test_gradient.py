@@ -11,7 +11,7 @@ from baselines.strategies.protocol import random_viewpoint
 from baselines.strategies.rules.gradient import GradientStrategy
 from entropy_explore_env.missions.view import RobotView, view_of
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.grid import Grid
 from tests.reference import rocha04
 from tests.reference.scenes import (
     as_reference,

@@ -19,8 +19,8 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
 from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import find_scenario
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import find_scenario
 from tests.planner.scenes import small_plan, varied
 from tests.reference import explorers as reference
 from tests.reference import planners

@@ -12,7 +12,7 @@ from baselines.strategies.rules.most_unmapped import LeastMapped, MostUnmapped, 
 from baselines.strategies.rules.next_best_view import NextBestView
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import view_of
-from entropy_explore_env.scenarios import TERRAIN
+from entropy_explore_env.settings.scenarios import TERRAIN
 from tests.baselines.strategies.rules.scenes import missions_of, play
 from tests.reference.scenes import started
 

@@ -15,8 +15,8 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import view_of
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX, LAB
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import BOX, LAB
 from tests.reference.scenes import free_box, put, started
 
 PLANAR = {"motion": "planar", "sensor_height_m": 1.25, "reach_m": 2.0, "turn_rate_rad_s": math.inf}

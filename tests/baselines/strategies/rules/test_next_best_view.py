@@ -12,9 +12,9 @@ from baselines.strategies.rules.next_best_view import NextBestView, NextBestView
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import find_scenario
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import find_scenario
 from tests.baselines.strategies.rules.scenes import missions_of, play
 from tests.missions.test_tick import toward
 from tests.reference import sujan

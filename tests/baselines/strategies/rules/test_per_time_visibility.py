@@ -24,9 +24,9 @@ from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX, find_scenario
-from entropy_explore_env.settings import Grid
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import BOX, find_scenario
 
 SETTINGS = {
     "per-time-visibility": ExplorationConfig(),

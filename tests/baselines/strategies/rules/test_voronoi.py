@@ -18,8 +18,8 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX, find_scenario
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import BOX, find_scenario
 from tests.reference.scenes import build_known, drawn, free_box, random_belief, seeds, started
 
 NAMES = ("voronoi", "voronoi-gradient", "voronoi-nearest")

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, fields
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.validation import check, check_kind, check_within, is_whole
+from entropy_explore_env.settings.validation import check, check_kind, check_within, is_whole
 
 _MOST_ROBOTS = 1000
 

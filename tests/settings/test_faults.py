@@ -7,12 +7,12 @@ import math
 
 import pytest
 
-from entropy_explore_env.channel_settings import Signal
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.fault_settings import Faults, Outage, RadioFault, SensorFault
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import BOX
-from entropy_explore_env.settings_json import scenario_from_json, settings_json
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.channel import Signal
+from entropy_explore_env.settings.faults import Faults, Outage, RadioFault, SensorFault
+from entropy_explore_env.settings.json import scenario_from_json, settings_json
+from entropy_explore_env.settings.scenarios import BOX
 
 TEAM = with_settings(BOX, {"robots": 3})
 

@@ -6,11 +6,16 @@ import dataclasses
 import math
 from types import MappingProxyType
 
-from entropy_explore_env.channel_settings import Channel
 from entropy_explore_env.errors import SettingError, one_of
-from entropy_explore_env.scenario import Scenario
-from entropy_explore_env.settings import Ending, Grid, RangeSensor, Reward, Robot, RobotKind
-from entropy_explore_env.validation import is_whole
+from entropy_explore_env.settings.channel import Channel
+from entropy_explore_env.settings.ending import Ending
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.reward import Reward
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.sensor import RangeSensor
+from entropy_explore_env.settings.validation import is_whole
 
 COST_PER_S_ALONE = MappingProxyType(
     {

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from entropy_explore_env.errors import SettingError, did_you_mean
-from entropy_explore_env.scenario import Scenario
+from entropy_explore_env.settings.scenario import Scenario
 
 Settings = TypeVar("Settings")
 INFINITY = "inf"

@@ -11,12 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env import settings_json as module
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS
-from entropy_explore_env.settings import Grid, RangeSensor, Robot, RobotKind
-from entropy_explore_env.settings_json import (
+from entropy_explore_env.settings import json as module
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.json import (
     dataclass_of,
     json_of,
     scenario_from_json,
@@ -24,6 +23,11 @@ from entropy_explore_env.settings_json import (
     settings_json,
     settings_of,
 )
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import BOX, ROOM, SCENARIOS
+from entropy_explore_env.settings.sensor import RangeSensor
 from tests.reference.scenes import drawn
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.validation import check, check_choice, check_count, check_kind, check_within
+from entropy_explore_env.settings.validation import check, check_choice, check_count, check_kind, check_within
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,19 @@ import pickle
 import numpy as np
 import pytest
 
-from entropy_explore_env.channel_settings import Channel
-from entropy_explore_env.decision_settings import Action, Observation
 from entropy_explore_env.errors import EntropyExploreError, SettingError
-from entropy_explore_env.scenario import Scenario, with_settings
-from entropy_explore_env.scenarios import BOX, ROOM, SCENARIOS, find_scenario
-from entropy_explore_env.settings import Ending, Grid, RangeSensor, Reward, Robot, RobotKind
+from entropy_explore_env.settings.action import Action
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.channel import Channel
+from entropy_explore_env.settings.ending import Ending
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.observation import Observation
+from entropy_explore_env.settings.reward import Reward
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import BOX, ROOM, SCENARIOS, find_scenario
+from entropy_explore_env.settings.sensor import RangeSensor
 
 NAN, INF = math.nan, math.inf
 NO_NUMBERS = ("1", None, True, [1.0], NAN)

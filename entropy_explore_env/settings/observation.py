@@ -1,4 +1,4 @@
-"""How robots decide: how a viewpoint is written as an action, and what is observed; frozen, checked once."""
+"""What robots observe."""
 
 from __future__ import annotations
 
@@ -6,44 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.validation import check_choice, check_count, check_counts, check_kind
-
-MAX_CANDIDATES = 64
-"""Viewpoints that a robot can be proposed: who sees a voxel is noted in the bits of a 64-bit number."""
-
-
-@dataclass(frozen=True)
-class Action:
-    """How a viewpoint is written as an action.
-
-    Attributes:
-        kind: `continuous`, a Box(-1, 1); `discrete`, moves by whole voxels × gaze directions; or
-            `candidates`, the number of one of the viewpoints that a planner proposes to the robot.
-        moves: Discrete moves: `all` voxels within reach, or `axes`: stay, and as far as reach and voxels
-            allow along each axis, both ways, which is 7 moves (5 of planar robots) to learn from.
-        yaws: Discrete gazes around the horizon.
-        pitches: Discrete gazes up and down, from -π/4 to π/4; planar robots have one, level.
-        candidates: K, viewpoints that are proposed at most, 1 to 64; the first is the planner's own choice.
-    """
-
-    kind: Literal["continuous", "discrete", "candidates"] = "continuous"
-    moves: Literal["all", "axes"] = "all"
-    yaws: int = 16
-    pitches: int = 3
-    candidates: int = 24
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_choice(self, "kind", Literal["continuous", "discrete", "candidates"])
-        check_choice(self, "moves", Literal["all", "axes"])
-        check_count(self, "yaws", 1, 360)
-        check_count(self, "pitches", 1, 90)
-        check_count(self, "candidates", 1, MAX_CANDIDATES)
-
-    @property
-    def by_number(self) -> bool:
-        """Whether an action is a whole number."""
-        return self.kind != "continuous"
+from entropy_explore_env.settings.validation import check_choice, check_count, check_counts, check_kind
 
 
 @dataclass(frozen=True)

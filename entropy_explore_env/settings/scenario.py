@@ -1,30 +1,28 @@
-"""A scenario: one task, put together from the parts of `settings` and checked as a whole."""
+"""A scenario: one task, put together from its parts and checked as a whole."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal, TypeVar
+from typing import Literal
 
 import numpy as np
 
-from entropy_explore_env.channel_settings import Channel
-from entropy_explore_env.decision_settings import Action, Observation
-from entropy_explore_env.errors import SettingError, did_you_mean
-from entropy_explore_env.fault_settings import Faults
-from entropy_explore_env.localization_settings import Fiducials
-from entropy_explore_env.settings import Ending, Grid, RangeSensor, Reward, Robot, RobotKind
-from entropy_explore_env.validation import (
-    check,
-    check_choice,
-    check_count,
-    check_instance,
-    check_kind,
-    check_within,
-)
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.settings.action import Action
+from entropy_explore_env.settings.channel import Channel
+from entropy_explore_env.settings.ending import Ending
+from entropy_explore_env.settings.faults import Faults
+from entropy_explore_env.settings.fiducials import Fiducials
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.observation import Observation
+from entropy_explore_env.settings.reward import Reward
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.sensor import RangeSensor
+from entropy_explore_env.settings.validation import check, check_choice, check_count, check_kind, check_within
 
 MAX_IN_FLIGHT = 2**24
 """Measurements of delayed messages that may be under way at once."""
@@ -38,7 +36,6 @@ MAX_SCANS_UNDER_WAY = 20_000
 """Scans under way, straight across the workspace."""
 MAX_ACTIONS = 2**20
 """Discrete actions, counted with those in the corners beyond reach."""
-Settings = TypeVar("Settings")
 
 
 @dataclass(frozen=True)
@@ -359,60 +356,3 @@ _PARTS: tuple[tuple[str, type], ...] = (
     ("action", Action),
     ("observation", Observation),
 )
-
-
-_SHORT = ("max_cycles", "time_limit_s")
-"""Fields of the ending that `with_settings` takes as the scenario's own."""
-
-
-def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
-    """A copy of the scenario with some settings changed.
-
-    Args:
-        scenario: What to start from.
-        settings: Field name → value. A part (`channel`, `robot`, …) takes either an object of its
-            class or a mapping of its own fields: `{"channel": {"burst": 32}}`. `max_cycles` and
-            `time_limit_s` are short for the fields of `ending`.
-
-    Raises:
-        SettingError: A name is unknown or a value is not allowed.
-    """
-    check_instance("scenario", scenario, Scenario)
-    if not isinstance(settings, Mapping):
-        raise SettingError("settings", settings, "a mapping from names of settings to values")
-    changes = dict(settings)
-    for name in _SHORT:
-        if name in changes:
-            ending = changes.get("ending", {})
-            shortcut = {name: changes.pop(name)}
-            if not isinstance(ending, Mapping | Ending):
-                raise SettingError("Scenario.ending", ending, "an Ending, or a mapping of its fields")
-            merged = {**ending, **shortcut} if isinstance(ending, Mapping) else _replaced(ending, shortcut)
-            changes["ending"] = merged
-    return _replaced(scenario, changes)
-
-
-def _meant(settings: object, name: str, known: Sequence[str]) -> str:
-    """End of the message about an unknown field: the part that has such a field, or a field that is alike."""
-    for part in known:
-        if name in getattr(getattr(settings, part, None), "__dataclass_fields__", ()):
-            return f"; did you mean {part}={{{name!r}: …}}?"
-    return did_you_mean(name, known)
-
-
-def _replaced(settings: Settings, changes: Mapping[str, Any]) -> Settings:
-    """Like dataclasses.replace, into nested parts, with a named error for an unknown field."""
-    fields = [f.name for f in dataclasses.fields(settings)]  # type: ignore[arg-type]
-    known = [*fields, *(_SHORT if isinstance(settings, Scenario) else ())]
-    values: dict[str, Any] = {}
-    for name, value in changes.items():
-        if name not in fields:
-            raise SettingError(
-                f"{type(settings).__name__}.{name}",
-                value,
-                "one of the fields " + ", ".join(fields) + _meant(settings, name, known),
-            )
-        current = getattr(settings, name)
-        nested = isinstance(value, Mapping) and dataclasses.is_dataclass(current)
-        values[name] = _replaced(current, value) if nested else value
-    return dataclasses.replace(settings, **values)  # type: ignore[type-var]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from entropy_explore_env.channel_settings import Channel
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.localization_settings import Fiducials
-from entropy_explore_env.scenario import with_settings
-from entropy_explore_env.scenarios import ROOM
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.channel import Channel
+from entropy_explore_env.settings.fiducials import Fiducials
+from entropy_explore_env.settings.scenarios import ROOM
 
 SUMMARIES = {"content": "summaries"}
 

@@ -1,0 +1,70 @@
+"""Scenarios with some settings changed."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeVar
+
+from entropy_explore_env.errors import SettingError, did_you_mean
+from entropy_explore_env.settings.ending import Ending
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.validation import check_instance
+
+Settings = TypeVar("Settings")
+
+_SHORT = ("max_cycles", "time_limit_s")
+"""Fields of the ending that `with_settings` takes as the scenario's own."""
+
+
+def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
+    """A copy of the scenario with some settings changed.
+
+    Args:
+        scenario: What to start from.
+        settings: Field name → value. A part (`channel`, `robot`, …) takes either an object of its
+            class or a mapping of its own fields: `{"channel": {"burst": 32}}`. `max_cycles` and
+            `time_limit_s` are short for the fields of `ending`.
+
+    Raises:
+        SettingError: A name is unknown or a value is not allowed.
+    """
+    check_instance("scenario", scenario, Scenario)
+    if not isinstance(settings, Mapping):
+        raise SettingError("settings", settings, "a mapping from names of settings to values")
+    changes = dict(settings)
+    for name in _SHORT:
+        if name in changes:
+            ending = changes.get("ending", {})
+            shortcut = {name: changes.pop(name)}
+            if not isinstance(ending, Mapping | Ending):
+                raise SettingError("Scenario.ending", ending, "an Ending, or a mapping of its fields")
+            merged = {**ending, **shortcut} if isinstance(ending, Mapping) else _replaced(ending, shortcut)
+            changes["ending"] = merged
+    return _replaced(scenario, changes)
+
+
+def _meant(settings: object, name: str, known: Sequence[str]) -> str:
+    """End of the message about an unknown field: the part that has such a field, or a field that is alike."""
+    for part in known:
+        if name in getattr(getattr(settings, part, None), "__dataclass_fields__", ()):
+            return f"; did you mean {part}={{{name!r}: …}}?"
+    return did_you_mean(name, known)
+
+
+def _replaced(settings: Settings, changes: Mapping[str, Any]) -> Settings:
+    """Like dataclasses.replace, into nested parts, with a named error for an unknown field."""
+    fields = [f.name for f in dataclasses.fields(settings)]  # type: ignore[arg-type]
+    known = [*fields, *(_SHORT if isinstance(settings, Scenario) else ())]
+    values: dict[str, Any] = {}
+    for name, value in changes.items():
+        if name not in fields:
+            raise SettingError(
+                f"{type(settings).__name__}.{name}",
+                value,
+                "one of the fields " + ", ".join(fields) + _meant(settings, name, known),
+            )
+        current = getattr(settings, name)
+        nested = isinstance(value, Mapping) and dataclasses.is_dataclass(current)
+        values[name] = _replaced(current, value) if nested else value
+    return dataclasses.replace(settings, **values)  # type: ignore[type-var]
