@@ -1,8 +1,8 @@
-"""A small film of every named scenario: `python -m baselines.films` writes docs/films/NAME.gif.
+"""A small film of every named scenario: `python -m baselines.films` writes docs/films/NAME.webp.
 
 A mission each of the recommended strategy, with the scenario's own team, for README and the
 cards of scenarios. With `--beside STRATEGY` a film shows two missions, in the same world and from the same
-start: `NAME-FIRST-SECOND.gif`. The same version gives the same films.
+start: `NAME-FIRST-SECOND.webp`. The same version gives the same films.
 """
 
 from __future__ import annotations
@@ -81,7 +81,8 @@ def main(words: Sequence[str]) -> int:
         pictures = (shrunk(picture, args.width) for picture in films[0].pictures(_LAST))
         if len(films) > 1:
             pictures = beside_each_other(films, shown, args.width)
-        path = args.out / f"{'-'.join([name, *shown] if len(films) > 1 else [name]).replace(':', '-')}.gif"
+        title = "-".join([name, *shown] if len(films) > 1 else [name]).replace(":", "-")
+        path = args.out / f"{title}.webp"
         animate(pictures, path, _FRAME_S)
         print(f"{path}, {path.stat().st_size / 1000:,.0f} kB")
     return 0

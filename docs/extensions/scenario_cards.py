@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 FOLDER = "scenarios"
 """Below `docs/`; git ignores it."""
 FILMS = "films"
-"""Below `docs/`: NAME.gif is shown where there is one."""
+"""Below `docs/`: NAME.webp is shown where there is one."""
 
 
 def write_cards(docs: Path) -> list[Path]:
@@ -369,9 +369,9 @@ def _changes(part: Any) -> str:  # noqa: ANN401 - any settings
 
 def _film(name: str, docs: Path) -> str:
     """The film of a mission, if there is one, and who acts in it if that is not whom we recommend."""
-    if not (docs / FILMS / f"{name}.gif").exists():
+    if not (docs / FILMS / f"{name}.webp").exists():
         return ""
-    return f"![A mission in {name}](../{FILMS}/{name}.gif)\n"
+    return f"![A mission in {name}](../{FILMS}/{name}.webp)\n"
 
 
 def _versions(name: str) -> str:

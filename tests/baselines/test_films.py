@@ -1,4 +1,4 @@
-"""`python -m baselines.films`: a small GIF a scenario, the mission from its beginning to its end."""
+"""`python -m baselines.films`: a small WebP a scenario, the mission from its beginning to its end."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_every_named_scenario_has_its_film():
-    assert {path.stem for path in (ROOT / "docs" / "films").glob("*.gif")} == set(SCENARIOS)
+    assert {path.stem for path in (ROOT / "docs" / "films").glob("*.webp")} == set(SCENARIOS)
 
 
 def test_a_film_shows_the_mission_from_beginning_to_end(tmp_path, capsys):
     words = ["--scenarios", "box-7x11x5", "--strategy", "random", "--pictures", "5", "--width", "160"]
     assert run_command(films.main, [*words, "--out", str(tmp_path)]) == 0
-    assert "box-7x11x5.gif, " in capsys.readouterr().out
+    assert "box-7x11x5.webp, " in capsys.readouterr().out
     film = films.filmed(BOX, "random", 0, 5)
     expected = [films.shrunk(picture, 160) for picture in film.pictures(films._LAST)]
-    with Image.open(tmp_path / "box-7x11x5.gif") as shown:
+    with Image.open(tmp_path / "box-7x11x5.webp") as shown:
         assert shown.size == (160, 120) and 3 <= shown.n_frames <= 5
         first = np.asarray(shown.convert("RGB")).astype(int)
         shown.seek(shown.n_frames - 1)
@@ -47,7 +47,7 @@ def test_two_missions_run_beside_each_other_on_one_clock(tmp_path, capsys):
         "160",
     ]
     assert run_command(films.main, [*words, "--pictures", "6", "--width", "160", "--out", str(tmp_path)]) == 0
-    assert "box-7x11x5-random-planned-rate.gif, " in capsys.readouterr().out
+    assert "box-7x11x5-random-planned-rate.webp, " in capsys.readouterr().out
     slow, quick = (films.filmed(BOX, strategy, 0, 6) for strategy in ("random", "planned-rate"))
     assert quick.times_s[-1] < slow.times_s[-1]
     pictures = list(films.beside_each_other([slow, quick], ["random", "planned-rate"], 160))
@@ -57,7 +57,7 @@ def test_two_missions_run_beside_each_other_on_one_clock(tmp_path, capsys):
         for film, columns in ((slow, slice(0, 160)), (quick, slice(160, 320))):
             shown = films.shrunk(film.picture_at(time_s), 160)
             np.testing.assert_array_equal(picture[16:, columns], shown)
-    with Image.open(tmp_path / "box-7x11x5-random-planned-rate.gif") as shown:
+    with Image.open(tmp_path / "box-7x11x5-random-planned-rate.webp") as shown:
         assert shown.size == (320, 136)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pygame
 import pytest
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageSequence
 
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.reports import annotations
@@ -328,6 +328,16 @@ def test_animation_of_more_colours_than_a_palette_holds(tmp_path: Path) -> None:
     animate([picture, picture[::-1]], tmp_path / "noise.gif", 0.02)
     with Image.open(tmp_path / "noise.gif") as animation:
         assert animation.n_frames == 2
+
+
+def test_a_webp_has_the_pixels_of_the_gif(tmp_path: Path) -> None:
+    pictures = [explored(share) for share in (0.0, 0.5, 1.0)]
+    shown = []
+    for suffix in ("gif", "webp"):
+        animate(pictures, tmp_path / f"mission.{suffix}", 0.05)
+        with Image.open(tmp_path / f"mission.{suffix}") as animation:
+            shown.append([np.asarray(each.convert("RGB")) for each in ImageSequence.Iterator(animation)])
+    np.testing.assert_array_equal(*shown)
 
 
 def test_an_animation_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
