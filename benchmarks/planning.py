@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from baselines.papers.bhattacharya.timing import cost_graph
+from baselines.papers.bhattacharya.measured import cost_graph
 from benchmarks.rows import Effort, Goal, Row, alone, compared, interleave, timed
 from entropy_explore_env.belief.paths.geodesic_cells import (
     UNREACHED,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 from baselines.experiments.statistics import Interval
@@ -14,6 +14,8 @@ _DIGITS = 4
 """Significant digits of figures below 1000; above, whole numbers."""
 _FEW = 3
 """Figures of a paper that stand in a line of a group of claims."""
+SAME = "the number"
+"""The paper claims that something is above or below the number to which it is compared."""
 
 
 @dataclass(frozen=True)
@@ -21,36 +23,60 @@ class Claim:
     """A claim of a paper beside what was measured.
 
     Attributes:
-        id: Stable name.
-        claim: What is claimed.
+        id: Stable name; its beginning says which group of claims it is in.
         paper: The paper's figure, if it gives one.
         ours: Ours.
         low: Lower end of a 95 % interval of ours, if it has one.
         high: Upper end.
         holds: Whether the claim holds.
+        claim: What is claimed beside what the group's text says; after `told` the whole text.
     """
 
     id: str
-    claim: str
     paper: float | str | None
     ours: float | str | None
     low: float | None
     high: float | None
     holds: bool
+    claim: str = ""
 
     def row(self) -> dict[str, Any]:
         """As JSON has it."""
         return asdict(self)
 
 
-def above(name: str, text: str, found: Interval, least: float = 1.0) -> Claim:
-    """Return the claim that something is above a number: it holds if the whole interval is."""
-    return Claim(name, text, f"> {least:g}", *found, found.low > least)
+def above(
+    name: str, found: Interval, least: float = 1.0, claim: str = "", paper: float | str | None = SAME
+) -> Claim:
+    """Return the claim that something is above a number: it holds if the whole interval is; see `below`."""
+    return Claim(name, f"> {least:g}" if paper == SAME else paper, *found, found.low > least, claim)
 
 
-def below(name: str, text: str, found: Interval, most: float = 1.0) -> Claim:
-    """Return the claim that something is below a number: it holds if the whole interval is."""
-    return Claim(name, text, f"< {most:g}", *found, found.high < most)
+def below(
+    name: str, found: Interval, most: float = 1.0, claim: str = "", paper: float | str | None = SAME
+) -> Claim:
+    """Return the claim that something is below a number: it holds if the whole interval is.
+
+    Args:
+        name: Its id.
+        found: What was measured.
+        most: The number.
+        claim: What is claimed beside what the group's text says.
+        paper: The paper's figure; SAME = that number.
+    """
+    return Claim(name, f"< {most:g}" if paper == SAME else paper, *found, found.high < most, claim)
+
+
+def told(claims: Sequence[Claim], groups: Mapping[str, str]) -> list[Claim]:
+    """Return claims with their whole text: that of their group, and what is said of each.
+
+    Raises:
+        SettingError: A claim is in no group.
+    """
+    return [
+        replace(each, claim=": ".join(filter(None, [groups[_group_of(each, groups)], each.claim])))
+        for each in claims
+    ]
 
 
 def groups_table(claims: Sequence[Claim], groups: Mapping[str, str]) -> str:
@@ -65,16 +91,21 @@ def groups_table(claims: Sequence[Claim], groups: Mapping[str, str]) -> str:
     """
     found: dict[str, list[Claim]] = {start: [] for start in groups}
     for claim in claims:
-        starts = [start for start in groups if claim.id.startswith(start)]
-        if not starts:
-            raise SettingError("claim", claim.id, f"in a group: {', '.join(groups)}")
-        found[max(starts, key=len)].append(claim)
+        found[_group_of(claim, groups)].append(claim)
     rows = [
         [groups[start], _paper_of(some), _ours_of(some), f"{sum(c.holds for c in some)} of {len(some)}"]
         for start, some in found.items()
         if some
     ]
     return markdown_table(["claim", "paper", "ours (95 % interval, or span)", "hold"], rows)
+
+
+def _group_of(claim: Claim, groups: Mapping[str, str]) -> str:
+    """Return the beginning of the id that names the group of a claim."""
+    starts = [start for start in groups if claim.id.startswith(start)]
+    if not starts:
+        raise SettingError("claim", claim.id, f"in a group: {', '.join(groups)}")
+    return max(starts, key=len)
 
 
 def _paper_of(claims: Sequence[Claim]) -> str:
@@ -96,23 +127,23 @@ def _ours_of(claims: Sequence[Claim]) -> str:
 
 def claims_csv(claims: Sequence[Claim]) -> str:
     """Return all claims as CSV, a line each."""
-    columns = {field.name: [getattr(claim, field.name) for claim in claims] for field in fields(Claim)}
-    return csv_table(columns)
+    return csv_table({each.name: [getattr(claim, each.name) for claim in claims] for each in fields(Claim)})
 
 
 def print_claims(claims: Sequence[Claim], paper: str) -> None:
-    """A table of the claims on standard output."""
+    """Print a table of the claims."""
     from rich.console import Console
     from rich.table import Table
 
     table = Table(title=paper, title_justify="left")
+    table.add_column("id", overflow="fold")
     table.add_column("claim")
     for head in ("paper", "ours", "95 % interval"):
         table.add_column(head, justify="right")
     table.add_column("holds")
     for claim in claims:
         holds = "[green]yes[/green]" if claim.holds else "[red]no[/red]"
-        table.add_row(claim.claim, _shown(claim.paper), _shown(claim.ours), _interval(claim), holds)
+        table.add_row(claim.id, claim.claim, _shown(claim.paper), _shown(claim.ours), _interval(claim), holds)
     Console().print(table)
 
 

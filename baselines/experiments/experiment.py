@@ -9,15 +9,44 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from baselines.experiments.claims import Claim, claims_csv, groups_table
+import numpy as np
+
+from baselines.experiments.claims import Claim, claims_csv, groups_table, told
 from baselines.experiments.page import Page
 from baselines.experiments.rows import Record, origins_line
+from baselines.experiments.statistics import Interval, ratio_interval
 from baselines.experiments.trials import How, Trial, by_cell, run_trials
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
 
 Records = dict[str, list[Record]]
 """Cell → records by seed."""
+
+
+def sample(records: Records, cell: str, figure: str = "t_mission_s") -> np.ndarray:
+    """Return (N,) a figure of each mission of a cell, by seed; missions cut off count with their limit.
+
+    Args:
+        records: By cell.
+        cell: Its name.
+        figure: Name of a number in a record; dots lead into its parts, as in `joint.explored`.
+    """
+    found: list[Any] = list(records[cell])
+    for name in figure.split("."):
+        found = [each[name] for each in found]
+    return np.asarray(found, float)
+
+
+def ratio_of(records: Records, over: str, under: str, figure: str = "t_mission_s") -> Interval:
+    """Return the mean of a figure in a cell over that in another; missions are paired by seed."""
+    both = sample(records, over, figure), sample(records, under, figure)
+    seeds = min(map(len, both))
+    return ratio_interval(both[0][:seeds], both[1][:seeds])
+
+
+def cut_off(records: Records) -> int:
+    """Return how many missions the time limit ended."""
+    return sum(not record["finished"] for cell in records.values() for record in cell)
 
 
 @dataclass(frozen=True)
@@ -110,7 +139,7 @@ def reproduce(
     started = time.perf_counter()
     rows = [row for row in run_trials(experiment.trials(amount), table, how) if row is not None]
     records = by_cell(rows)
-    claims = experiment.claims(records)
+    claims = told(experiment.claims(records), experiment.groups)
     page = Page(
         experiment.template,
         {name: partial(draw, records) for name, draw in experiment.figures.items()},

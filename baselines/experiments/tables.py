@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from tabulate import DataRow, TableFormat, tabulate
 
@@ -34,6 +34,22 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str
     """A Markdown table; cells stand in it as `str` has them."""
     text = tabulate(rows, head, _MARKDOWN, disable_numparse=True, stralign=None, numalign=None)
     return text + "\n"
+
+
+def cells_table(
+    names: Sequence[str],
+    rows: Iterable[tuple[Sequence[object], str]],
+    columns: Mapping[str, Callable[[str], object]],
+) -> str:
+    """Return a Markdown table of cells of an experiment, a row each.
+
+    Args:
+        names: Heads of what tells the cells apart.
+        rows: Of each row what stands below them, and the cell.
+        columns: Head → what is shown of a cell.
+    """
+    shown = [[*row, *(show(cell) for show in columns.values())] for row, cell in rows]
+    return markdown_table([*names, *columns], shown)
 
 
 def csv_table(columns: Mapping[str, Sequence[object]]) -> str:

@@ -177,7 +177,7 @@ def nothing_breaks(records: Sequence[Record]) -> Claim:
     """Claim that no mission raises an error, runs past the time on the clock, or has a figure that is NaN."""
     broken = sum(map(_broken, records))
     text = f"missions of {len(records):,} that raise an error, hang or report NaN"
-    return Claim("nothing-breaks", text, 0.0, float(broken), None, None, broken == 0)
+    return Claim("nothing-breaks", 0.0, float(broken), None, None, broken == 0, text)
 
 
 def _broken(figures: object) -> bool:
@@ -219,9 +219,9 @@ def _claim(
     allowed = f"≤ {most:.3g}"
     found = {condition: ratio for condition, ratio in ratios.items() if ratio is not None}
     if not found:
-        return Claim(name, f"{text}: all missions were cut off", allowed, None, None, None, False)
+        return Claim(name, allowed, None, None, None, False, f"{text}: all missions were cut off")
     worst = max(found, key=lambda condition: (found[condition].high, found[condition].value))
     holds = not cut and all(ratio.high <= most * MARGIN for ratio in found.values())
     text = f"{text}; at worst: {worst or 'nothing fails'}"
     text += f"; missions were cut off with {', '.join(name or 'no fault' for name in cut)}" if cut else ""
-    return Claim(name, text, allowed, *found[worst], holds)
+    return Claim(name, allowed, *found[worst], holds, text)

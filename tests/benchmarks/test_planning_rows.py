@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.sparse.csgraph import dijkstra
 
-from baselines.papers.bhattacharya.timing import cost_graph
+from baselines.papers.bhattacharya.measured import cost_graph
 from benchmarks.planning import (
     Search,
     check_tessellation,

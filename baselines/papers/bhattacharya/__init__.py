@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from baselines.experiments.experiment import Experiment
-from baselines.papers.bhattacharya import claims, figures, missions
+from baselines.papers.bhattacharya import claims, figures
 from baselines.papers.bhattacharya.sweep import experiment
 
 EXPERIMENT = Experiment(
@@ -30,8 +30,8 @@ EXPERIMENT = Experiment(
         "coverage": claims.coverage_table,
         "exploration": claims.exploration_table,
         "split": claims.split_table,
-        "flying": missions.flying_table,
-        "channel": missions.channel_table,
+        "flying": claims.flying_table,
+        "channel": claims.channel_table,
     },
     seeds=20,
     quick_seeds=5,

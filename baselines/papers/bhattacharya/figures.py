@@ -14,8 +14,8 @@ from baselines.cli.figures import COLOURS
 from baselines.experiments.experiment import Records
 from baselines.experiments.plots import one_axes
 from baselines.papers.bhattacharya.claims import exploring, first_floor
+from baselines.papers.bhattacharya.measured import SHAPE, robot_cells, split, unknown_region
 from baselines.papers.bhattacharya.run import Run, start_cells, unpacked
-from baselines.papers.bhattacharya.splitting import SHAPE, robot_cells, split, unknown_region
 from baselines.papers.bhattacharya.sweep import FLOORS, VARIANTS, all_runs, coverage_id, exploration_id
 from entropy_explore_env.belief.paths.geodesic_cells import new_tessellation, tessellate
 from entropy_explore_env.errors import counted
@@ -126,7 +126,7 @@ def figure_6(records: Records, variant: str, settings: str) -> Figure:
     run, record = _run(cell), records[cell][0]
     maps = unpacked(record["maps"])
     team = f"{run.shape[0]} × {run.shape[1]} cells, {counted(run.robots, 'robot')}"
-    title = f"{team}, range {run.rules.sensor.range_cells:g}; {settings}"
+    title = f"{team}, range {run.rules.range_cells:g}; {settings}"
     moments = sum(name.startswith("entropy_") for name in maps)
     figure = Figure(figsize=(10.2, 2.9 * math.ceil(moments / 3)), layout="constrained")
     places, width = np.array(record["places"]), run.shape[1]

@@ -68,18 +68,19 @@ class Run:
         if not self.pictured:
             return record_of(simulation.run(self.limit, 1 if self.known else 0))
         taken: list[dict[str, np.ndarray]] = []
-        for _ in range(self.limit):
-            goes_on = simulation.step(False)
+
+        def note(goes_on: bool) -> None:
             if len(simulation.trace.places) % _SNAPSHOT_PERIOD == 1 or not goes_on:
                 taken.append(_snapshot(simulation))
-            if not goes_on:
-                simulation.trace.ended = "converged"
-                break
-        maps: dict[str, np.ndarray] = {}
+
+        trace = simulation.run(self.limit, 0, note)
         chosen = np.unique(np.linspace(0, len(taken) - 1, SNAPSHOTS).round().astype(int))
-        for number, index in enumerate(chosen):
-            maps |= {f"{name}_{number}": array for name, array in taken[index].items()}
-        return {**record_of(simulation.trace), "maps": packed(maps)}
+        maps = {
+            f"{name}_{number}": array
+            for number, index in enumerate(chosen)
+            for name, array in taken[index].items()
+        }
+        return {**record_of(trace), "maps": packed(maps)}
 
     def plan(self) -> np.ndarray:
         """(X, Y, 1) bool, occupied."""
@@ -147,25 +148,10 @@ def record_of(trace: Trace) -> Record:
         "ended": trace.ended,
         "cycle": trace.cycle,
         "explored_at": trace.explored_at,
-        "uncertain_left": trace.uncertain[-1],
         "seconds_an_iteration": float(seconds.mean()) if len(seconds) else 0.0,
         "seconds_with_tessellation": float(np.median(seconds[busy[1:]])) if busy[1:].any() else 0.0,
-        "tessellations": int(sum(trace.tessellations)),
         "rises": int((falls < -1e-12).sum()),
         "largest_rise": float(max((-falls).max(initial=0.0), 0.0)),
-        "functional_first": _number(functional[0]),
-        "functional_last": _number(functional[-1]),
-        "bits": trace.bits[-1],
         "places": trace.places,
-        "series": {
-            "iteration": rows.tolist(),
-            "uncertain": np.array(trace.uncertain)[rows].tolist(),
-            "entropy": np.round(np.array(trace.entropy)[rows], 1).tolist(),
-            "functional": [_number(value) for value in functional[rows]],
-            "bits": np.array(trace.bits)[rows].tolist(),
-        },
+        "series": {"iteration": rows.tolist(), "uncertain": np.array(trace.uncertain)[rows].tolist()},
     }
-
-
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
+from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from baselines.experiments.experiment import Amount
-from baselines.experiments.rows import Record
-from baselines.experiments.trials import Trial, trials_of
-from baselines.papers.bhattacharya.missions import mission_cells
-from baselines.papers.bhattacharya.run import Run, start_cells
-from baselines.papers.bhattacharya.simulation.belief import Sensor
-from baselines.papers.bhattacharya.simulation.team import Rules, Simulation
-from baselines.papers.bhattacharya.splitting import ratios
-from baselines.papers.bhattacharya.timing import beside_scipy, changed_share
+from baselines.experiments.trials import Cell, Trial, trials_of
+from baselines.papers.bhattacharya.measured import Measured
+from baselines.papers.bhattacharya.run import Run
+from baselines.papers.bhattacharya.simulation.team import Rules
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenarios import find_scenario
 
 CONTROLS: dict[str, dict[str, Any]] = {
     "projected": {"control": "projected-centroid", "guarded": False},
@@ -36,6 +33,28 @@ VARIANTS: dict[str, dict[str, Any]] = {
 """Of (b): one thing changed at a time, but for `nearest-length`."""
 PICTURED = ("paper", "nearest-length")
 """Of (b), each in the largest plan in which it is run."""
+
+
+FLYING = ("voronoi", "voronoi-nearest", "gradient", "planned-rate")
+FLYING_LIMIT_S = 600.0
+
+CHANNELS: dict[str, dict[str, Any]] = {
+    "utility-64": {"burst": 64},
+    "phases-64-once": {"burst": 64, "phase_s": 10.0},
+    "phases-32-twice": {"burst": 32, "phase_s": 10.0, "repeats": 2},
+    "phases-16-four-times": {"burst": 16, "phase_s": 10.0, "repeats": 4},
+    "utility-all": {"burst": 180},
+    "phases-all-once": {"burst": 180, "phase_s": 10.0},
+}
+"""Channel settings; I_min = 0, so that the first four send 64 measurements a scan each, the others 180."""
+LOSSES = (0.0, 0.5)
+RIVALS = {
+    "phases-64-once": "utility-64",
+    "phases-32-twice": "utility-64",
+    "phases-16-four-times": "utility-64",
+    "phases-all-once": "utility-all",
+}
+"""Which settings send as many measurements a scan at once."""
 
 
 @dataclass(frozen=True)
@@ -90,6 +109,42 @@ def coverage_id(control: str, starts: str) -> str:
 def exploration_id(floor: str, variant: str, range_cells: float) -> str:
     """Return the name of runs of (b); variant `paper` = nothing changed."""
     return f"exploration-{floor}-{variant}-{range_cells:g}"
+
+
+def flying_id(world: str, strategy: str) -> str:
+    """Name of a cell of (e)."""
+    return f"flying-{world}-{strategy}"
+
+
+def channel_id(channel: str, loss: float) -> str:
+    """Name of a cell of (f)."""
+    return f"channel-{channel}-loss-{loss:g}"
+
+
+def mission_cells(seeds: int, corridor: Path | None) -> list[Cell]:
+    """All cells.
+
+    Args:
+        seeds: Missions of each flying team; four times as many of each channel.
+        corridor: An OctoMap of a real corridor; None = without it.
+    """
+    cave = with_settings(
+        find_scenario("cave"), {"robots": 4, "time_limit_s": FLYING_LIMIT_S, "track_truth": True}
+    )
+    cells = [Cell(flying_id("cave", strategy), cave, strategy, seeds) for strategy in FLYING]
+    if corridor is not None:
+        changes = {"world": str(corridor), "robots": 4, "time_limit_s": FLYING_LIMIT_S, "track_truth": True}
+        robot = {"navigator": "planned", "reach_m": 3.0, "max_speed_m_s": 0.5, "acceleration_m_s2": 0.5}
+        sensor = find_scenario("office-3d").sensor
+        real = with_settings(find_scenario("room"), {**changes, "robot": robot, "sensor": sensor})
+        cells += [Cell(flying_id("corridor", strategy), real, strategy, seeds) for strategy in FLYING]
+    office = find_scenario("office")
+    for name, channel in CHANNELS.items():
+        for loss in LOSSES:
+            settings = {**channel, "i_min_bits": 0.0, "loss_probability": loss}
+            scenario = with_settings(office, {"channel": settings, "time_limit_s": 1200.0})
+            cells.append(Cell(channel_id(name, loss), scenario, "voronoi-nearest", 4 * seeds))
+    return cells
 
 
 def experiment(amount: Amount) -> list[Trial]:
@@ -149,43 +204,9 @@ def _exploration(floor: str, variant: str, range_cells: float, seed: int) -> Run
         "corner",
         seed,
         4,
-        Rules(sensor=Sensor(range_cells), **changes),
+        Rules(range_cells=range_cells, **changes),
         known=False,
         limit=plan.limit,
         pictured=seed == 0 and variant in PICTURED and range_cells == plan.middle,
         cell_m=plan.cell_m,
     )
-
-
-@dataclass(frozen=True)
-class Measured:
-    """What is measured beside the runs: (c), and a tessellation of the largest plan on the clock.
-
-    Attributes:
-        largest: A run in that plan.
-    """
-
-    largest: Run
-    cell: str = "measured"
-    seed: int = 0
-    world: str = "bhattacharya-cluttered"
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """The run."""
-        return {"largest": self.largest.settings}
-
-    def run(self) -> Record:
-        """Measure.
-
-        Returns:
-            `splits`, ratios of (c) by region; `ours_s` and `scipy_s` of a tessellation; `changed`, the share
-            of a small plan's cells whose cost or owner changes from one tessellation to the next.
-        """
-        plan = self.largest.plan()
-        costs = np.where(plan, np.inf, 1.0).astype(np.float32)
-        seconds = beside_scipy(costs, np.array(start_cells(plan, "random", 4, 0)))
-        run = replace(_exploration("small", "paper", FLOORS["small"].ranges[0], 0), pictured=False)
-        simulation = Simulation(run.plan(), start_cells(run.plan(), run.starts, run.robots, 0), run.rules)
-        changed = changed_share(simulation, 200)
-        return {"splits": ratios(), "ours_s": seconds.ours, "scipy_s": seconds.scipy, "changed": changed}

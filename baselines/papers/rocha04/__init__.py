@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-from baselines.experiments.experiment import Experiment
+from baselines.experiments.experiment import Experiment, cut_off
 from baselines.papers.rocha04 import claims, figures
 from baselines.papers.rocha04.sweep import experiment
 
@@ -25,7 +25,7 @@ EXPERIMENT = Experiment(
         "figure-8": partial(figures.figure_shared, what="I_min"),
     },
     tables={"teams": claims.teams_table, "changes": claims.changes_table},
-    values={"cut off": claims.cut_off},
+    values={"cut off": cut_off},
     seeds=100,
     quick_seeds=10,
 )

@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from baselines.cli.figures import COLOURS
-from baselines.experiments.experiment import Records
+from baselines.experiments.experiment import Records, sample
 from baselines.experiments.plots import interval_line, one_axes
 from baselines.experiments.rows import Record
 from baselines.experiments.statistics import mean_interval
-from baselines.papers.rocha04.claims import PAPER_T_MISSION_S, times
+from baselines.papers.rocha04.claims import PAPER_T_MISSION_S
 from baselines.papers.rocha04.sweep import BURSTS, I_MINS, STANDARD, TEAMS, alternative_id, team_id
 
 _ALTERNATIVES = {
@@ -81,10 +81,10 @@ def figure_time(records: Records, what: str) -> Figure:
     )
     sizes = np.array([1, *TEAMS])
     for number, (label, burst, i_min_bits) in enumerate(_lines(what)):
-        points = [mean_interval(times(records, team_id(robots, burst, i_min_bits))) for robots in sizes]
+        points = [mean_interval(sample(records, team_id(robots, burst, i_min_bits))) for robots in sizes]
         interval_line(axes, sizes + 0.05 * (number - 1), points, color=COLOURS[number], label=label)
     for strategy, (label, marker, colour, shift) in _ALTERNATIVES.items():
-        points = [mean_interval(times(records, alternative_id(robots, strategy))) for robots in sizes]
+        points = [mean_interval(sample(records, alternative_id(robots, strategy))) for robots in sizes]
         style = {"linestyle": ":", "marker": marker, "color": colour, "label": f"{label}, 64, 0.3219"}
         interval_line(axes, sizes + shift, points, **style)
     axes.plot([1], [PAPER_T_MISSION_S], "k*", label="the paper's mean of 10 starts")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from baselines.experiments.experiment import Experiment
+from baselines.experiments.experiment import Experiment, cut_off
 from baselines.papers.rochami import claims, figures
 from baselines.papers.rochami.sweep import experiment
 
@@ -23,7 +23,7 @@ EXPERIMENT = Experiment(
         "sharing": figures.figure_sharing,
     },
     tables={"teams": claims.teams_table},
-    values={"cut off": claims.cut_off},
+    values={"cut off": cut_off},
     seeds=50,
     quick_seeds=10,
     least_seeds=2,

@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from baselines.cli.figures import COLOURS
-from baselines.experiments.experiment import Records
+from baselines.experiments.experiment import Records, ratio_of, sample
 from baselines.experiments.plots import interval_line, mean_band
-from baselines.experiments.statistics import mean_interval, ratio_interval
+from baselines.experiments.statistics import mean_interval
 from baselines.papers.rochami.claims import (
     PAPER_COORDINATED,
     PAPER_REAL,
@@ -19,7 +19,6 @@ from baselines.papers.rochami.claims import (
     bits_sent,
     distances,
     teams_in,
-    times,
 )
 from baselines.papers.rochami.sweep import (
     BLOCKED,
@@ -55,15 +54,15 @@ def figure_6(records: Records) -> Figure:
     """Draw mission time over team size: both methods and a random walk; blocked robots wait, or wander."""
     figure = Figure(figsize=(9.6, 4.2), layout="constrained")
     panels, sizes = figure.subplots(1, 2, sharey=True), (1, *teams_in(records))
-    one_s = times(records, cell_id(1, "coordinated")).mean()
+    one_s = sample(records, cell_id(1, "coordinated")).mean()
     for axes, blocked in zip(panels, BLOCKED, strict=True):
         for method in METHODS:
-            samples = [times(records, cell_id(n, method, blocked)) for n in sizes]
+            samples = [sample(records, cell_id(n, method, blocked)) for n in sizes]
             colour, marker, line = _STYLES[method]
             label = "random walk" if method == "random" else method
             _line(axes, sizes, samples, color=colour, marker=marker, linestyle=line, label=label)
         if blocked == "wait":
-            means = [times(records, f"n{n}-random-1m").mean() for n in sizes]
+            means = [sample(records, f"n{n}-random-1m").mean() for n in sizes]
             axes.plot(sizes, means, "+:", color="0.7", label="random walk, steps up to 1 m")
         star = {"markersize": 13, "markeredgecolor": "k"}
         axes.plot([2], [PAPER_COORDINATED * one_s], "*", color=COLOURS[0], **star)
@@ -86,7 +85,7 @@ def figure_7(records: Records) -> Figure:
     figure = Figure(figsize=(6.4, 6.0), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True)
     other = top.twinx()
-    time_s = [times(records, kappa_id(kappa)) for kappa in kappas]
+    time_s = [sample(records, kappa_id(kappa)) for kappa in kappas]
     path_m = [distances(records, kappa_id(kappa)) for kappa in kappas]
     both = [t * d for t, d in zip(time_s, path_m, strict=True)]
     lines = ((time_s, top, COLOURS[0], "o"), (path_m, other, COLOURS[1], "s"), (both, bottom, "0.2", "^"))
@@ -108,7 +107,7 @@ def figure_coverage(records: Records) -> Figure:
     figure = Figure(figsize=(9.6, 6.0), layout="constrained")
     panels = np.atleast_2d(figure.subplots(2, len(sizes), sharex="col", squeeze=False))
     for column, n in enumerate(sizes):
-        last_s = max(float(np.median(times(records, cell_id(n, m)))) for m in METHODS[:2])
+        last_s = max(float(np.median(sample(records, cell_id(n, m)))) for m in METHODS[:2])
         grid = np.linspace(0.0, last_s, 60)
         for method in METHODS[:2]:
             found = [record["coverage"] for record in records[cell_id(n, method)]]
@@ -130,8 +129,7 @@ def figure_changes(records: Records) -> Figure:
     for number, n in enumerate(FEW):
         for row, name in enumerate(names):
             cells = [cell_id(n, m) if name is None else change_id(name, n, m) for m in METHODS[:2]]
-            starts = min(len(records[cell]) for cell in cells)
-            ratio = ratio_interval(*(times(records, cell)[:starts] for cell in cells))
+            ratio = ratio_of(records, *cells)
             y, colour = row + 0.2 * (number - 1), COLOURS[number]
             axes.plot([ratio.low, ratio.high], [y, y], color=colour, linewidth=1.5)
             label = f"{n} robots" if row == 0 else None
@@ -156,7 +154,7 @@ def figure_sharing(records: Records) -> Figure:
         lines = (("fixed I_min", fixed, 1, ":"), ("steered, share of the burst", steered, 0, "-"))
         for label, cells, number, line in lines:
             sent = [float(bits_sent(records, cell).mean()) for cell in cells.values()]
-            points = [mean_interval(times(records, cell)) for cell in cells.values()]
+            points = [mean_interval(sample(records, cell)) for cell in cells.values()]
             interval_line(axes, sent, points, linestyle=line, color=COLOURS[number], label=label)
             for text, x, point in zip(cells, sent, points, strict=True):
                 place = {"xytext": (4, 5), "textcoords": "offset points", "fontsize": 8}

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from baselines.experiments.claims import Claim, above
-from baselines.experiments.experiment import Records
-from baselines.experiments.statistics import Interval, mean_interval, ratio_interval
+from baselines.experiments.claims import SAME, Claim, above, below
+from baselines.experiments.experiment import Records, sample
+from baselines.experiments.statistics import Interval, ratio_interval
 from baselines.experiments.tables import markdown_table
 from baselines.papers.sawhney.sweep import (
     BETAS,
@@ -86,11 +86,6 @@ def betas_in(records: Records, part: str) -> tuple[int, ...]:
     return tuple(b for b in (*BETAS, *FARTHER_BETAS[part]) if cell_id(world, team, f"beta-{b}") in records)
 
 
-def times(records: Records, cell: str, end: str) -> np.ndarray:
-    """Times of a cell in seconds, by seed."""
-    return np.asarray([record[end] for record in records[cell]], float)
-
-
 def relative(
     records: Records,
     part: str,
@@ -115,8 +110,8 @@ def relative(
     for world in worlds or worlds_in(records, part):
         by_team = []
         for n in teams or teams_in(records, part):
-            unit = times(records, cell_id(world, n, "ptv"), end)[seeds].mean()
-            by_team.append(times(records, cell_id(world, n, method), end)[seeds] / unit)
+            unit = sample(records, cell_id(world, n, "ptv"), end)[seeds].mean()
+            by_team.append(sample(records, cell_id(world, n, method), end)[seeds] / unit)
         found.append(np.mean(by_team, axis=0))
     return np.concatenate(found)
 
@@ -150,75 +145,54 @@ def best_beta(
 
 
 def all_claims(records: Records) -> list[Claim]:
-    """Every claim, from the missions' records by cell."""
+    """Return every claim, from the missions' records by cell."""
+    kinds = (_paper_claims, _extreme_claims, _distance_claims, _our_claims)
+    parts = [part for part in PARTS if worlds_in(records, part)]
+    return [claim for part in parts for kind in kinds for claim in kind(records, part)]
+
+
+def _paper_claims(records: Records, part: str) -> list[Claim]:
+    """Claim what is faster: asynchronous allocation, V/t, ray-cast V, the height factor, own β."""
+    several = [n for n in teams_in(records, part) if n > 1]
     claims = []
-    for part in PARTS:
-        if worlds_in(records, part):
-            claims += _part_claims(records, part)
+    for end, text in ENDS.items():
+        best = best_beta(records, part, end)
+        rivals: dict[str, tuple[str, float | str, Sequence[int]]] = {
+            "async": ("sync", PAPER_ASYNCHRONOUS[part], several),
+            "beta": (f"beta-{best}", PAPER_BEST_BETA[part], ()),
+            "naive": ("naive", SAME, ()),
+            "no-height": ("no-height", SAME, ()),
+        }
+        skipped = {"no-height"} if part == "plans" else set()
+        for name, (rival, paper, teams) in rivals.items():
+            if name in skipped or (name == "async" and not several):
+                continue
+            ratio = compared(records, part, "ptv", rival, end, teams)
+            said = f"{text}, β = {best}" if name == "beta" else text
+            claims.append(below(f"{part}-{name}-{end}", ratio, claim=said, paper=paper))
+        claims.append(_no_single_beta(records, part, end))
     return claims
 
 
-def _part_claims(records: Records, part: str) -> list[Claim]:
-    """The claims of plans, or of terrains."""
-    name, claims = PARTS[part], []
-    several = [n for n in teams_in(records, part) if n > 1]
-    for end, text in ENDS.items() if several else ():
-        ratio = compared(records, part, "ptv", "sync", end, several)
-        claim = f"{name}, {text}: asynchronous is faster than synchronous; t ratio"
-        claims.append(_faster(f"{part}-async-{end}", claim, PAPER_ASYNCHRONOUS[part], ratio))
-    for end, text in ENDS.items():
-        best = best_beta(records, part, end)
-        ratio = compared(records, part, "ptv", f"beta-{best}", end)
-        claim = f"{name}, {text}: V/t is faster than the best β ({best}); t ratio"
-        claims.append(_faster(f"{part}-beta-{end}", claim, PAPER_BEST_BETA[part], ratio))
-    for end, text in ENDS.items():
-        claims += _extreme_claims(records, part, end, f"{name}, {text}")
-    claims += [_no_single_beta(records, part, end) for end in ENDS]
-    claims += _distance_claims(records, part, name)
-    for other, what in (
-        ("naive", "ray-cast V is faster than naive V"),
-        ("no-height", "the height factor helps"),
-    ):
-        if other == "no-height" and part == "plans":
-            continue
-        for end, text in ENDS.items():
-            ratio = compared(records, part, "ptv", other, end)
-            claims.append(_faster(f"{part}-{other}-{end}", f"{name}, {text}: {what}; t ratio", "< 1", ratio))
-    return [*claims, *_our_claims(records, part, name)]
-
-
-def _faster(name: str, claim: str, paper: float | str | None, ratio: Interval) -> Claim:
-    """Holds if the whole interval is below 1."""
-    return Claim(name, claim, paper, *ratio, ratio.high < 1.0)
-
-
-def _extreme_claims(records: Records, part: str, end: str, text: str) -> list[Claim]:
-    """The smallest and the largest β are slower than the best."""
-    best, claims, swept = best_beta(records, part, end), [], betas_in(records, part)
-    widest = best_beta(records, part, end, among=swept)
-    claim = f"ours, {text}: the best of all β that were tried ({widest}) has others on both sides; its place"
-    inside = swept[0] < widest < swept[-1]
-    claims.append(
-        Claim(
-            f"{part}-interior-{end}",
-            claim,
-            None,
-            f"{swept.index(widest) + 1} of {len(swept)}",
-            None,
-            None,
-            inside,
-        )
-    )
+def _extreme_claims(records: Records, part: str) -> list[Claim]:
+    """Claim that the smallest and the largest β are slower than the best."""
+    claims, swept = [], betas_in(records, part)
     betas = [beta for beta in swept if beta in BETAS]
-    for beta in (betas[0], betas[-1]):
-        ratio = compared(records, part, f"beta-{beta}", f"beta-{best}", end)
-        claim = f"{text}: β = {beta} is slower than the best β ({best}); t ratio"
-        claims.append(above(f"{part}-extreme-{beta}-{end}", claim, ratio))
+    for end, text in ENDS.items():
+        widest = best_beta(records, part, end, among=swept)
+        place, inside = f"{swept.index(widest) + 1} of {len(swept)}", swept[0] < widest < swept[-1]
+        claims.append(
+            Claim(f"{part}-interior-{end}", None, place, None, None, inside, f"{text}, β = {widest}")
+        )
+        best = best_beta(records, part, end)
+        for beta in (betas[0], betas[-1]):
+            ratio = compared(records, part, f"beta-{beta}", f"beta-{best}", end)
+            claims.append(above(f"{part}-extreme-{beta}-{end}", ratio, claim=f"{text}, β = {best}"))
     return claims
 
 
 def _no_single_beta(records: Records, part: str, end: str) -> Claim:
-    """Every world's own best β is faster than the best of all.
+    """Claim that every world's own best β is faster than the best of all.
 
     Chosen on half of the seeds and compared on the rest, and the other way round: no β is judged by the
     missions that it was chosen for.
@@ -231,52 +205,44 @@ def _no_single_beta(records: Records, part: str, end: str) -> Claim:
             for beta, found in ((best, own), (overall, shared)):
                 found.append(relative(records, part, f"beta-{beta}", end, (), (world,), judged))
     listed = ", ".join(f"{world} {best_beta(records, part, end, (world,))}" for world in worlds)
-    text = f"{PARTS[part]}, {ENDS[end]}: every world's own best β ({listed}) is faster than the best of all "
-    text += f"({best_beta(records, part, end)}), on other seeds than it was chosen on; t ratio"
-    return _faster(
-        f"{part}-no-single-{end}", text, "< 1", ratio_interval(np.concatenate(own), np.concatenate(shared))
-    )
+    text = f"{ENDS[end]}, β: {listed}, all {best_beta(records, part, end)}"
+    ratio = ratio_interval(np.concatenate(own), np.concatenate(shared))
+    return below(f"{part}-no-single-{end}", ratio, claim=text)
 
 
-def _distance_claims(records: Records, part: str, name: str) -> list[Claim]:
-    """To explore all, V/t visits nearly as many points as the best β, on shorter paths (abstract)."""
+def _distance_claims(records: Records, part: str) -> list[Claim]:
+    """Claim that V/t visits nearly as many points as the best β to explore all, on shorter paths."""
     best = best_beta(records, part, "t_none_s")
     scans, lengths = (
         compared(records, part, "ptv", f"beta-{best}", what) for what in ("scans", "distance_m")
     )
     alike = scans.low > 1.0 - _ALIKE and scans.high < 1.0 + _ALIKE
-    text = f"{name}, to no frontier: V/t scans from nearly as many points as the best β ({best}); ratio"
-    shorter = f"{name}, to no frontier: ways of V/t are shorter than those of the best β ({best}); ratio"
+    text = f"to no frontier, β = {best}"
     return [
-        Claim(f"{part}-points", text, "about 1", *scans, alike),
-        _faster(f"{part}-ways", shorter, "< 1", lengths),
+        Claim(f"{part}-points", "about 1", *scans, alike, text),
+        below(f"{part}-ways", lengths, claim=text),
     ]
 
 
-def _our_claims(records: Records, part: str, name: str) -> list[Claim]:
-    """Not the paper's: the finishing rule, other rules, and the gain over the best β by team size."""
+def _our_claims(records: Records, part: str) -> list[Claim]:
+    """Claim what the paper does not: the finishing rule, other rules, and gains by team size."""
     claims = []
-    for end in ENDS:
-        ratio = compared(records, part, "finish", "ptv", end)
-        text = f"ours, {name}, {ENDS[end]}: (V + bonus)/t is faster than V/t; t ratio"
-        claims.append(_faster(f"{part}-finish-{end}", text, None, ratio))
-    for other, metric in (("nearest", "Yamauchi"), ("coordinated", "Burgard")):
-        for end in ("t95_s", "t_none_s"):
-            ratio = compared(records, part, "ptv", other, end)
-            text = f"ours, {name}, {ENDS[end]}: V/t is faster than {metric}'s metric; t ratio"
-            claims.append(_faster(f"{part}-{other}-{end}", text, None, ratio))
+    for name, (ours, theirs) in {
+        "finish": ("finish", "ptv"),
+        "nearest": ("ptv", "nearest"),
+        "coordinated": ("ptv", "coordinated"),
+    }.items():
+        for end in ENDS if name == "finish" else ("t95_s", "t_none_s"):
+            ratio = compared(records, part, ours, theirs, end)
+            claims.append(below(f"{part}-{name}-{end}", ratio, claim=ENDS[end], paper=None))
+    best = best_beta(records, part, "t95_s")
     for n in teams_in(records, part):
         if n > 1:
             ratio = compared(records, part, "ptv", "sync", "t95_s", (n,))
-            text = f"ours, {name}, to 95 %, {n} robots: asynchronous is faster than synchronous; t ratio"
-            claims.append(_faster(f"{part}-async-team-{n}", text, None, ratio))
-    best = best_beta(records, part, "t95_s")
-    for n in teams_in(records, part):
+            claims.append(below(f"{part}-async-team-{n}", ratio, claim="to 95 %", paper=None))
         ratio = compared(records, part, "ptv", f"beta-{best}", "t95_s", (n,))
-        text = f"{name}, to 95 %, {n} robot{'s' * (n > 1)}: V/t is faster than β = {best}; t ratio"
-        said = part == "plans" and n == 1
-        text, paper = (text, PAPER_SINGLE) if said else (f"ours, {text}", None)
-        claims.append(_faster(f"{part}-team-{n}", text, paper, ratio))
+        paper = PAPER_SINGLE if part == "plans" and n == 1 else None
+        claims.append(below(f"{part}-team-{n}", ratio, claim=f"to 95 %, β = {best}", paper=paper))
     return claims
 
 
@@ -289,34 +255,15 @@ def changes_in(records: Records, part: str) -> dict[str, tuple[str, ...]]:
     return {change: worlds for change, worlds in found.items() if worlds}
 
 
-def changed_ratio(
-    records: Records, change: str | None, method: str, end: str, worlds: Sequence[str]
-) -> Interval:
-    """V/t over another method at `CHANGED_TEAM`, with one thing changed; relative in each world."""
-    return ratio_interval(*_changed(records, change, method, end, worlds))
-
-
-def fastest_changed(
-    records: Records, change: str | None, methods: Sequence[str], end: str, worlds: Sequence[str]
-) -> str:
-    """Of some methods the one with the least mean time, relative to V/t in each world."""
-    return min(methods, key=lambda method: _changed(records, change, method, end, worlds)[1].mean())
-
-
 def _changed(
-    records: Records, change: str | None, method: str, end: str, worlds: Sequence[str]
+    records: Records, change: str | None, method: str, worlds: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(N,) relative times of V/t and of another method, by world and seed."""
-    return _in_units_of_first(records, (("ptv", change), (method, change)), end, worlds)
-
-
-def _in_units_of_first(
-    records: Records, pair: Sequence[tuple[str, str | None]], end: str, worlds: Sequence[str]
-) -> tuple[np.ndarray, np.ndarray]:
-    """(N,) times of two methods, each with what is changed, over the first one's mean in each world."""
+    """(N,) times to 95 % of V/t and of another method, one thing changed, over V/t's mean in each world."""
     found: tuple[list[np.ndarray], list[np.ndarray]] = [], []
     for world in worlds:
-        both = [times(records, cell_id(world, CHANGED_TEAM, *cell), end) for cell in pair]
+        both = [
+            sample(records, cell_id(world, CHANGED_TEAM, name, change), "t95_s") for name in ("ptv", method)
+        ]
         for values, taken in zip(found, both, strict=True):
             values.append(taken / both[0].mean())
     return np.concatenate(found[0]), np.concatenate(found[1])
@@ -330,9 +277,9 @@ def changed_table(records: Records) -> str:
         betas = [method for method in CHANGED_METHODS[part] if method.startswith("beta-")]
         worlds = next(iter(changes.values()), ())
         for change in (None, *changes) if changes else ():
-            other = fastest_changed(records, change, betas, "t95_s", worlds)
+            pairs = [_changed(records, change, beta, worlds) for beta in betas]
+            ratio = ratio_interval(*min(pairs, key=lambda pair: pair[1].mean()))
             text = "as it is" if change is None else CHANGES[part][change].text
-            ratio = changed_ratio(records, change, other, "t95_s", worlds)
             rows.append([f"{PARTS[part]}, {text}", f"{ratio:.2f}"])
     return markdown_table(["changed", "V/t over the faster β, to 95 %"], rows)
 
@@ -342,7 +289,7 @@ def maps_table(records: Records) -> str:
     rows = []
     for world in dict.fromkeys(cell.split("/")[0] for cell in records if cell.startswith("map-")):
         cells = [cell_id(world, MAP_TEAM, method) for method in MAP_METHODS]
-        means = [f"{mean_interval(times(records, cell, 't_none_s')).value:,.0f}" for cell in cells]
+        means = [f"{sample(records, cell, 't_none_s').mean():,.0f}" for cell in cells]
         rows.append([world.removeprefix("map-"), *means])
     return markdown_table(["plan", *MAP_METHODS], rows) if rows else "None were given."
 

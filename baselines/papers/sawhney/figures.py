@@ -9,7 +9,7 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from baselines.cli.figures import COLOURS
-from baselines.experiments.experiment import Records
+from baselines.experiments.experiment import Records, sample
 from baselines.experiments.plots import interval_line, mean_band
 from baselines.papers.sawhney.claims import (
     ENDS,
@@ -22,7 +22,6 @@ from baselines.papers.sawhney.claims import (
     compared,
     relative,
     teams_in,
-    times,
     worlds_in,
 )
 from baselines.papers.sawhney.sweep import cell_id
@@ -69,7 +68,7 @@ def figure_times(records: Records, part: str) -> Figure:
     lines += [(right, "sync", "V/t, synchronous", COLOURS[0]), (right, "naive", "naive V/t", COLOURS[1])]
     for axes, method, label, colour in lines:
         samples = [
-            np.concatenate([times(records, cell_id(w, n, method), "t95_s") for w in worlds]) for n in teams
+            np.concatenate([sample(records, cell_id(w, n, method), "t95_s") for w in worlds]) for n in teams
         ]
         style = {"color": colour, "marker": "o", "markersize": 3, "label": label}
         if axes is right:

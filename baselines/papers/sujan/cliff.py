@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from baselines.experiments.claims import Claim, above, below
-from baselines.experiments.experiment import Amount, Experiment, Records
+from baselines.experiments.experiment import Amount, Experiment, Records, sample
 from baselines.experiments.mission import Surroundings
-from baselines.experiments.statistics import mean_interval, ratio_interval
-from baselines.experiments.tables import markdown_table
+from baselines.experiments.statistics import Interval, mean_interval, ratio_interval
+from baselines.experiments.tables import cells_table
 from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.papers.sujan import cliff_figures
 from baselines.papers.sujan.cliff_figures import edge_corners, samples_table
@@ -55,47 +56,24 @@ def experiment(amount: Amount) -> list[CellTrial]:
 
 def all_claims(records: Records) -> list[Claim]:
     """Return every claim."""
-    return [*_ratio_claims(records), *_order_claims(records), _step_claim(records), *_look_claims(records)]
 
+    def more(better: int, worse: int, steps: int) -> Interval:
+        return ratio_interval(*(new_columns(records, method)[:, steps] for method in (better, worse)))
 
-def _ratio_claims(records: Records) -> list[Claim]:
-    claims = []
-    for steps in (FEW, MORE, STEPS):
-        ratio = ratio_interval(*(new_columns(records, method)[:, steps] for method in (5, 1)))
-        text = f"method 5 maps about ten times what method 1 maps, after {steps} steps; ratio"
-        claims.append(Claim(f"ten-{steps}", text, _PAPER_RATIO, *ratio, ratio.high >= _PAPER_RATIO))
-    return claims
-
-
-def _order_claims(records: Records) -> list[Claim]:
-    claims = []
-    for better, worse in ((3, 1), (3, 2), (4, 3), (5, 4), (5, 3)):
-        ratio = ratio_interval(*(new_columns(records, method)[:, FEW] for method in (better, worse)))
-        text = f"method {better} maps more than method {worse} ({METHODS[worse]}) in {FEW} steps; ratio"
-        claims.append(above(f"more-{better}-{worse}", text, ratio))
-    return claims
-
-
-def _step_claim(records: Records) -> Claim:
+    tens = {steps: more(5, 1, steps) for steps in (FEW, MORE, STEPS)}
     share = mean_interval(steps_needed(records))
-    text = f"method 5 needs about half the steps that method 3 needs for what it maps in {MORE}; share"
-    return Claim("half", text, _PAPER_SHARE, *share, share.low <= _PAPER_SHARE)
-
-
-def _look_claims(records: Records) -> list[Claim]:
-    ratio = ratio_interval(*(answered(records, method, MORE) for method in (5, 3)))
-    text = f"of what its looks should show, method 5 obtains more than method 3, in {MORE} steps; ratio"
-    claims = [above("answered", text, ratio)]
-    for steps in (FEW, STEPS):
-        ratio = ratio_interval(*(interest_in(records, part, steps) for part in ("unreadable", "readable")))
-        text = (
-            f"after {steps} steps of method 5 interest is less in unreadable than in readable ground; ratio"
-        )
-        claims.append(below(f"interest-{steps}", text, ratio))
     stops = sum(record["edge_stops"] for method in METHODS for record in records[cell_id(method)])
+    interest = {
+        steps: ratio_interval(*(interest_in(records, part, steps) for part in ("unreadable", "readable")))
+        for steps in (FEW, STEPS)
+    }
     return [
-        *claims,
-        Claim("edge", "drives that the edge ended, of all methods", 0, stops, None, None, stops == 0),
+        *(Claim(f"ten-{n}", _PAPER_RATIO, *found, found.high >= _PAPER_RATIO) for n, found in tens.items()),
+        *(above(f"more-{a}-{b}", more(a, b, FEW)) for a, b in ((3, 1), (3, 2), (4, 3), (5, 4), (5, 3))),
+        Claim("half", _PAPER_SHARE, *share, share.low <= _PAPER_SHARE),
+        above("answered", ratio_interval(*(answered(records, method, MORE) for method in (5, 3)))),
+        *(below(f"interest-{steps}", found) for steps, found in interest.items()),
+        Claim("edge", 0, stops, None, None, stops == 0),
     ]
 
 
@@ -105,36 +83,36 @@ def answered(records: Records, method: int, steps: int) -> np.ndarray:
     return np.asarray(looks[0] / np.maximum(looks[1], 1.0))
 
 
+def _columns_after(records: Records, steps: int) -> Callable[[str], str]:
+    """Return what shows the new columns of a cell's method after some steps."""
+    return lambda cell: f"{mean_interval(new_columns(records, int(cell[-1]))[:, steps]):,.0f}"
+
+
 def _methods_table(records: Records) -> str:
     """Return a table of the methods."""
-    rows = []
-    for method, strategy in METHODS.items():
-        columns = new_columns(records, method)
-        way_m = np.array([record["distance_m"] for record in records[cell_id(method)]], float)
-        shown = [f"{mean_interval(columns[:, n]):,.0f}" for n in (FEW, MORE, STEPS)]
-        rows.append([str(method), strategy, *shown, f"{way_m.mean():.1f}"])
-    heads = [f"new columns after {n} steps" for n in (FEW, MORE, STEPS)]
-    return markdown_table(["method", "strategy", *heads, "way (m)"], rows)
+    columns = {f"new columns after {n} steps": _columns_after(records, n) for n in (FEW, MORE, STEPS)}
+    columns["way (m)"] = lambda cell: f"{sample(records, cell, 'distance_m').mean():.1f}"
+    return cells_table(
+        ["method", "strategy"], [(each, cell_id(each[0])) for each in METHODS.items()], columns
+    )
 
 
 def _field_table(records: Records) -> str:
     """Return figs. 29, 31 and 32 in numbers: methods 3 and 5 over the first steps."""
-    rows, steps = [], sorted({1, 2, FEW // 2, FEW})
-    for method in (3, 5):
-        columns = new_columns(records, method)
-        left = [interest_in(records, part, FEW).mean() for part in ("unreadable", "readable")]
-        rows.append(
-            [
-                str(method),
-                *(f"{mean_interval(columns[:, n]):,.0f}" for n in steps),
-                f"{mean_interval(answered(records, method, FEW)):.2f}",
-                "{:.2f}, {:.2f}".format(*left) if method == 5 else "–",
-            ]
-        )
-    head = [f"fig. 29: new columns after {n} step{'s' * (n > 1)}" for n in steps]
-    head.append(f"fig. 31: obtained of expected in {FEW} looks")
-    head.append(f"fig. 32: interest left after {FEW} steps, unreadable and readable ground")
-    return markdown_table(["method", *head], rows)
+    steps = sorted({1, 2, FEW // 2, FEW})
+    columns = {
+        f"fig. 29: new columns after {n} step{'s' * (n > 1)}": _columns_after(records, n) for n in steps
+    }
+
+    def left(cell: str) -> str:
+        parts = [interest_in(records, part, FEW).mean() for part in ("unreadable", "readable")]
+        return "{:.2f}, {:.2f}".format(*parts) if cell == cell_id(5) else "–"
+
+    columns[f"fig. 31: obtained of expected in {FEW} looks"] = lambda cell: (
+        f"{mean_interval(answered(records, int(cell[-1]), FEW)):.2f}"
+    )
+    columns[f"fig. 32: interest left after {FEW} steps, unreadable and readable ground"] = left
+    return cells_table(["method"], [((method,), cell_id(method)) for method in (3, 5)], columns)
 
 
 EXPERIMENT = Experiment(

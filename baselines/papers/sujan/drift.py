@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 
 from baselines.cli.figures import COLOURS
 from baselines.experiments.claims import Claim, below
-from baselines.experiments.experiment import Amount, Experiment, Records
+from baselines.experiments.experiment import Amount, Experiment, Records, ratio_of, sample
 from baselines.experiments.mission import run_mission
 from baselines.experiments.rows import Record
 from baselines.experiments.statistics import mean_interval, ratio_interval
-from baselines.experiments.tables import markdown_table
+from baselines.experiments.tables import cells_table
 from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.strategies import make_strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -148,31 +148,29 @@ def all_claims(records: Records) -> list[Claim]:
 
 
 def _claims(records: Records, strategy: str, level: str) -> list[Claim]:
-    """Return the claims that drift costs a strategy little time, and little of what it sees."""
-    drifting, exact = cell_id(strategy, level), cell_id(strategy, "none")
-    ratio = ratio_interval(half_times_s(records, drifting), half_times_s(records, exact))
-    reached = min(saw_half(records, cell) for cell in (drifting, exact))
-    text = f"{strategy}, {level} drift: half is seen in at most {_MOST_SLOWER - 1:.0%} more time; ratio"
+    """Claim that drift costs a strategy little time, and little of what it sees."""
+    both = cell_id(strategy, level), cell_id(strategy, "none")
+    ratio = ratio_interval(*(half_times_s(records, cell) for cell in both))
+    reached = min(saw_half(records, cell) for cell in both)
     enough = reached >= 1.0 - _MOST_CUT_OFF
-    if not enough:
-        text += f" (only {reached:.0%} of the missions did)"
+    text = "" if enough else f"only {reached:.0%} of the missions did"
     holds = ratio.high <= _MOST_SLOWER and enough
-    half = Claim(f"half-{strategy}-{level}", text, f"≤ {_MOST_SLOWER}", *ratio, holds)
-    share = ratio_interval(*(joint(records, cell, "explored") for cell in (drifting, exact)))
-    text = f"{strategy}, {level} drift: sees at least {_LEAST_SEEN:.0%} of what it sees without; ratio"
-    seen = Claim(f"seen-{strategy}-{level}", text, f"≥ {_LEAST_SEEN}", *share, share.low >= _LEAST_SEEN)
-    return [half, seen]
+    share = ratio_of(records, *both, "joint.explored")
+    return [
+        Claim(f"half-{strategy}-{level}", f"≤ {_MOST_SLOWER}", *ratio, holds, text),
+        Claim(f"seen-{strategy}-{level}", f"≥ {_LEAST_SEEN}", *share, share.low >= _LEAST_SEEN),
+    ]
 
 
 def _guard_claims(records: Records, strategy: str, level: str) -> list[Claim]:
-    """Return the claims that margin and guard save blocked drives and time."""
-    guarded, plain = cell_id(strategy, level), cell_id(strategy, level, True)
-    fewer = mean_interval(blocked(records, guarded) - blocked(records, plain))
-    text = f"{strategy}, {level} drift: margin and guard save blocked drives; difference"
-    drives = below(f"blocked-{strategy}-{level}", text, fewer, 0.0)
-    ratio = ratio_interval(half_times_s(records, guarded), half_times_s(records, plain))
-    text = f"{strategy}, {level} drift: with margin and guard half is seen in less time; ratio"
-    return [drives, below(f"guard-{strategy}-{level}", text, ratio)]
+    """Claim that margin and guard save blocked drives and time."""
+    both = cell_id(strategy, level), cell_id(strategy, level, True)
+    drives = [sample(records, cell, "blocked_moves") for cell in both]
+    ratio = ratio_interval(*(half_times_s(records, cell) for cell in both))
+    return [
+        below(f"blocked-{strategy}-{level}", mean_interval(drives[0] - drives[1]), 0.0),
+        below(f"guard-{strategy}-{level}", ratio),
+    ]
 
 
 def half_times_s(records: Records, cell: str) -> np.ndarray:
@@ -184,16 +182,6 @@ def half_times_s(records: Records, cell: str) -> np.ndarray:
 def saw_half(records: Records, cell: str) -> float:
     """Share of the missions that saw half of what can be seen."""
     return float(np.mean([record["joint"]["t50_seen_s"] is not None for record in records[cell]]))
-
-
-def blocked(records: Records, cell: str) -> np.ndarray:
-    """(N,) drives of each mission that something ended early."""
-    return np.asarray([record["blocked_moves"] for record in records[cell]], float)
-
-
-def joint(records: Records, cell: str, field: str) -> np.ndarray:
-    """(N,) a figure of each mission's joint map against the truth."""
-    return np.asarray([record["joint"][field] for record in records[cell]], float)
 
 
 def error_m(records: Records, cell: str) -> np.ndarray:
@@ -214,23 +202,23 @@ def _plain_table(records: Records) -> str:
 
 
 def _table(records: Records, cells: Sequence[tuple[str, str, bool]]) -> str:
-    rows = []
-    for strategy, level, plain in cells:
-        cell = cell_id(strategy, level, plain)
-        rows.append(
-            [
-                f"{strategy}, plain" if plain else strategy,
-                level,
-                f"{mean_interval(half_times_s(records, cell)):.0f}",
-                f"{saw_half(records, cell):.0%}",
-                f"{joint(records, cell, 'explored').mean():.3f}",
-                f"{100.0 * joint(records, cell, 'wrong').mean():.2f}",
-                f"{error_m(records, cell).mean():.3f}",
-                f"{blocked(records, cell).mean():.1f}",
-            ]
-        )
-    head = ["strategy", "drift", "half seen (s)", "saw half", "share seen", "wrong (%)", "rms error (m)"]
-    return markdown_table([*head, "blocked"], rows)
+    rows = [
+        ((f"{strategy}, plain" if plain else strategy, level), cell_id(strategy, level, plain))
+        for strategy, level, plain in cells
+    ]
+
+    def mean(cell: str, figure: str) -> float:
+        return float(sample(records, cell, figure).mean())
+
+    columns = {
+        "half seen (s)": lambda cell: f"{mean_interval(half_times_s(records, cell)):.0f}",
+        "saw half": lambda cell: f"{saw_half(records, cell):.0%}",
+        "share seen": lambda cell: f"{mean(cell, 'joint.explored'):.3f}",
+        "wrong (%)": lambda cell: f"{100.0 * mean(cell, 'joint.wrong'):.2f}",
+        "rms error (m)": lambda cell: f"{error_m(records, cell).mean():.3f}",
+        "blocked": lambda cell: f"{mean(cell, 'blocked_moves'):.1f}",
+    }
+    return cells_table(["strategy", "drift"], rows, columns)
 
 
 def figure_drift(records: Records) -> Figure:
@@ -241,7 +229,7 @@ def figure_drift(records: Records) -> Figure:
     for number, strategy in enumerate(STRATEGIES):
         cells = [cell_id(strategy, level) for level in LEVELS]
         style: Any = {"color": COLOURS[number % len(COLOURS)], "marker": "o"}
-        wrongs.plot(factors, [100.0 * joint(records, cell, "wrong").mean() for cell in cells], **style)
+        wrongs.plot(factors, [100.0 * sample(records, cell, "joint.wrong").mean() for cell in cells], **style)
         times.plot(factors, [half_times_s(records, cell).mean() for cell in cells], label=strategy, **style)
     wrongs.set(xlabel="drift over high drift", ylabel="voxels on the wrong side of ½ (%)", ylim=(0, None))
     times.set(xlabel="drift over high drift", ylabel="seconds to half of what can be seen", ylim=(0, None))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,11 +13,11 @@ from matplotlib.figure import Figure
 
 from baselines.cli.figures import COLOURS
 from baselines.experiments.claims import Claim, below
-from baselines.experiments.experiment import Amount, Experiment, Records
+from baselines.experiments.experiment import Amount, Experiment, Records, sample
 from baselines.experiments.mission import run_mission
 from baselines.experiments.rows import Record
 from baselines.experiments.statistics import mean_interval, ratio_interval
-from baselines.experiments.tables import markdown_table
+from baselines.experiments.tables import cells_table
 from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.papers.sujan.planar import METHODS, at_end, in_the_middle, scenario_of
 from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
@@ -141,27 +142,22 @@ def drifting(count: int, reach: str, scans: int) -> Scenario:
 
 def all_claims(records: Records) -> list[Claim]:
     """Return every claim."""
-    claims = []
-    for reach in REACH_M:
-        for fewer, more in itertools.pairwise(COUNTS):
-            text = f"{reach} fiducials: the error is less with {more} than with {fewer}; ratio"
-            pair = cell_id(more, reach), cell_id(fewer, reach)
-            claims.append(_less(records, f"number-{reach}-{more}", text, *pair))
-    for count in COUNTS[1:]:
-        text = f"{count} within reach: the error is less with near fiducials than with far ones; ratio"
-        claims.append(_less(records, f"near-{count}", text, cell_id(count, "near"), cell_id(count, "far")))
-    text = "ours: the error is less with landmarks of its own map than with none; ratio"
-    claims.append(_less(records, "own", text, OWN_ID, cell_id(0, "far")))
+    pairs = {
+        f"number-{reach}-{more}": (cell_id(more, reach), cell_id(fewer, reach))
+        for reach in REACH_M
+        for fewer, more in itertools.pairwise(COUNTS)
+    }
+    pairs |= {f"near-{count}": (cell_id(count, "near"), cell_id(count, "far")) for count in COUNTS[1:]}
+    pairs["own"] = OWN_ID, cell_id(0, "far")
+    claims = [
+        below(name, ratio_interval(*(rms_error_m(records, cell) for cell in cells)))
+        for name, cells in pairs.items()
+    ]
     for count, weight in itertools.product(SPARSE, ERROR_WEIGHTS):
-        text = f"ours: {count} within reach, w_LE {weight:g} instead of 0: less of the map is wrong; ratio"
         cells = cell_id(count, "far", weight), cell_id(count, "far")
         ratio = ratio_interval(*(at_end(records, cell, "wrong") for cell in cells))
-        claims.append(below(f"weight-{count}-{weight:g}", text, ratio))
+        claims.append(below(f"weight-{count}-{weight:g}", ratio, claim=f"w_LE {weight:g} instead of 0"))
     return claims
-
-
-def _less(records: Records, name: str, text: str, smaller: str, larger: str) -> Claim:
-    return below(name, text, ratio_interval(rms_error_m(records, smaller), rms_error_m(records, larger)))
 
 
 def errors_by_way(records: Records, cell: str) -> np.ndarray:
@@ -189,50 +185,53 @@ def time_to_map(records: Records, cell: str, share: float) -> np.ndarray:
     return np.asarray(times, float)
 
 
+def _columns(records: Records) -> dict[str, Callable[[str], str]]:
+    """Return what both tables show of a cell."""
+    return {
+        f"rms over {WAY_M:.0f} m, mean of worlds (m)": lambda cell: (
+            f"{mean_interval(rms_error_m(records, cell)):.3f}"
+        ),
+        "wrong, mean": lambda cell: f"{mean_interval(at_end(records, cell, 'wrong')):.4f}",
+        "share mapped, mean": lambda cell: f"{at_end(records, cell, 'mapped').mean():.3f}",
+    }
+
+
 def _fiducials_table(records: Records) -> str:
     """Return a table of numbers of fiducials within reach."""
-    cells = [("0", "", cell_id(0, "far")), ("own", "", OWN_ID)]
-    cells += [(str(count), reach, cell_id(count, reach)) for reach in REACH_M for count in COUNTS if count]
-    rows = []
-    for count, reach, cell in cells:
+    rows = [(("0", ""), cell_id(0, "far")), (("own", ""), OWN_ID)]
+    rows += [((count, reach), cell_id(count, reach)) for reach in REACH_M for count in COUNTS if count]
+
+    def sighted(cell: str) -> str:
         told = [record["localization"] for record in records[cell]]
-        sighted = np.mean([each["sightings"] + each.get("own_sightings", 0) for each in told])
-        rows.append(
-            [
-                count,
-                reach,
-                f"{sighted / np.mean([record['scans'] for record in records[cell]]):.2f}",
-                f"{mean_interval(rms_error_m(records, cell)):.3f}",
-                f"{mean_interval(errors_by_way(records, cell)[:, -1]):.2f}",
-                f"{at_end(records, cell, 'mapped').mean():.3f}",
-                f"{mean_interval(at_end(records, cell, 'wrong')):.4f}",
-            ]
-        )
-    head = ["within reach", "", "sighted a scan", f"rms over {WAY_M:.0f} m, mean of worlds (m)"]
-    head.append(f"error after {WAY_M:.0f} m, mean of worlds (m)")
-    return markdown_table([*head, "share mapped, mean", "wrong, mean"], rows)
+        found = np.mean([each["sightings"] + each.get("own_sightings", 0) for each in told])
+        return f"{found / sample(records, cell, 'scans').mean():.2f}"
+
+    def last_error(cell: str) -> str:
+        return f"{mean_interval(errors_by_way(records, cell)[:, -1]):.2f}"
+
+    head = f"error after {WAY_M:.0f} m, mean of worlds (m)"
+    columns = {"sighted a scan": sighted, **_columns(records), head: last_error}
+    return cells_table(["within reach", ""], rows, columns)
 
 
 def _weights_table(records: Records) -> str:
     """Return a table of weights of the localization error in the rating."""
-    rows = []
-    for count, weight in itertools.product(SPARSE, (0.0, *ERROR_WEIGHTS)):
-        cell = cell_id(count, "far", weight)
-        times = [time_to_map(records, name, _SHARE) for name in (cell, cell_id(count, "far"))]
-        rows.append(
-            [
-                str(count),
-                f"{weight:g}",
-                f"{mean_interval(rms_error_m(records, cell)):.3f}",
-                f"{mean_interval(at_end(records, cell, 'wrong')):.4f}",
-                f"{at_end(records, cell, 'mapped').mean():.3f}",
-                f"{at_end(records, cell, 'driven_m_by_scan').mean():,.0f}",
-                f"{ratio_interval(*times):.2f}",
-            ]
-        )
-    head = ["within reach", "w_LE", f"rms over {WAY_M:.0f} m, mean of worlds (m)", "wrong, mean"]
-    head += ["share mapped, mean", "way, mean (m)", f"seconds to {_SHARE:.0%} mapped, over w_LE 0"]
-    return markdown_table(head, rows)
+    rows = [
+        ((count, f"{weight:g}"), cell_id(count, "far", weight))
+        for count, weight in itertools.product(SPARSE, (0.0, *ERROR_WEIGHTS))
+    ]
+
+    def slower(cell: str) -> str:
+        unweighted = cell.partition("-weight")[0]
+        times = [time_to_map(records, name, _SHARE) for name in (cell, unweighted)]
+        return f"{ratio_interval(*times):.2f}"
+
+    columns = {
+        **_columns(records),
+        "way, mean (m)": lambda cell: f"{at_end(records, cell, 'driven_m_by_scan').mean():,.0f}",
+        f"seconds to {_SHARE:.0%} mapped, over w_LE 0": slower,
+    }
+    return cells_table(["within reach", "w_LE"], rows, columns)
 
 
 def figure_19(records: Records) -> Figure:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -18,7 +19,7 @@ from baselines.experiments.mission import Surroundings, run_mission
 from baselines.experiments.plots import mean_band
 from baselines.experiments.rows import Record
 from baselines.experiments.statistics import mean_interval, ratio_interval
-from baselines.experiments.tables import markdown_table
+from baselines.experiments.tables import cells_table
 from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.strategies import make_strategy
 from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
@@ -149,9 +150,29 @@ GROUPS = {
 
 
 def all_claims(records: Records) -> list[Claim]:
-    """Every claim, from the missions' records by cell."""
-    kinds = (_most_claims, _order_claims, _ratio_claims)
-    return [claim for robots in TEAMS for claims in kinds for claim in claims(records, robots)]
+    """Return every claim, from the missions' records by cell."""
+    return [claim for robots in TEAMS for claim in _team_claims(records, robots)]
+
+
+def _team_claims(records: Records, robots: int) -> list[Claim]:
+    """Claim which method maps more for the same scans, and for each metre, and which drives more."""
+    cells = {method: cell_id(robots, method) for method in METHODS}
+    share = {method: mapped(records, cell) for method, cell in cells.items()}
+    density = {method: mapped_per_metre(records, cell) for method, cell in cells.items()}
+    ways = [at_end(records, cells[method], "driven_m_by_scan") for method in ("v", "iii")]
+
+    def ratios(name: str, values: dict[str, np.ndarray], better: str, others: str) -> list[Claim]:
+        judge = below if name == "worst" else above
+        pairs = {other: ratio_interval(values[better], values[other]) for other in others.split()}
+        return [judge(f"{name}-{robots}-{other}", ratio) for other, ratio in pairs.items()]
+
+    return [
+        *ratios("most", share, "v", "i ii iii iv"),
+        *ratios("order", share, "i", "iii iv"),
+        *ratios("metre", density, "v", "i ii iii iv"),
+        *ratios("worst", density, "i", "ii iii iv"),
+        above(f"way-{robots}", ratio_interval(*ways)),
+    ]
 
 
 def by_scan(records: Records, cell: str, field: str, scans: int = SCANS) -> np.ndarray:
@@ -176,48 +197,6 @@ def mapped_per_metre(records: Records, cell: str) -> np.ndarray:
     return np.asarray(100.0 * share / np.maximum(way_m, 1.0))
 
 
-def _team(robots: int) -> str:
-    return "one robot" if robots == 1 else f"{robots} robots"
-
-
-def _most_claims(records: Records, robots: int) -> list[Claim]:
-    """(v) maps most for the same number of scans."""
-    claims, best = [], mapped(records, cell_id(robots, "v"))
-    for method in ("i", "ii", "iii", "iv"):
-        ratio = ratio_interval(best, mapped(records, cell_id(robots, method)))
-        text = f"{_team(robots)}: (v) maps more for the same scans than ({method}) {METHODS[method]}; ratio"
-        claims.append(above(f"most-{robots}-{method}", text, ratio))
-    return claims
-
-
-def _order_claims(records: Records, robots: int) -> list[Claim]:
-    """Random poses map more than (iii) and (iv), as the paper's text says."""
-    claims, walk = [], mapped(records, cell_id(robots, "i"))
-    for method in ("iii", "iv"):
-        ratio = ratio_interval(walk, mapped(records, cell_id(robots, method)))
-        text = f"{_team(robots)}: (i) random poses map more than ({method}) {METHODS[method]}; ratio"
-        claims.append(above(f"order-{robots}-{method}", text, ratio))
-    return claims
-
-
-def _ratio_claims(records: Records, robots: int) -> list[Claim]:
-    """(v) maps most for each metre, random poses least; (v) drives a little more than (iii)."""
-    claims, team = [], _team(robots)
-    density = {method: mapped_per_metre(records, cell_id(robots, method)) for method in METHODS}
-    for method in ("i", "ii", "iii", "iv"):
-        ratio = ratio_interval(density["v"], density[method])
-        text = f"{team}: (v) maps more for each metre than ({method}) {METHODS[method]}; ratio"
-        claims.append(above(f"metre-{robots}-{method}", text, ratio))
-    for method in ("ii", "iii", "iv"):
-        ratio = ratio_interval(density["i"], density[method])
-        than = f"({method}) {METHODS[method]}"
-        text = f"{team}: (i) random poses map less for each metre than {than}; ratio"
-        claims.append(below(f"worst-{robots}-{method}", text, ratio))
-    ways = [at_end(records, cell_id(robots, name), "driven_m_by_scan") for name in ("v", "iii")]
-    text = f"{team}: (v) drives slightly more than (iii) most-unmapped; ratio"
-    return [*claims, above(f"way-{robots}", text, ratio_interval(*ways))]
-
-
 def figure_scans(records: Records, robots: int) -> Figure:
     """Draw share mapped and way driven over scans, means of all worlds with intervals."""
     figure = Figure(figsize=(9.0, 3.8), layout="constrained")
@@ -236,37 +215,37 @@ def figure_scans(records: Records, robots: int) -> Figure:
     return figure
 
 
-def _row(records: Records, cell: str, first: list[str]) -> list[str]:
-    """A cell's figures, after what it is."""
-    share, way_m = (at_end(records, cell, field) for field in ("mapped", "driven_m_by_scan"))
-    return [
-        *first,
-        f"{mean_interval(mapped(records, cell)):.3f}",
-        f"{share.mean():.3f}",
-        f"{way_m.mean():,.0f}",
-        f"{mean_interval(mapped_per_metre(records, cell)):.3f}",
-    ]
+def _columns(records: Records) -> dict[str, Callable[[str], str]]:
+    """Return what the tables show of a cell."""
 
+    def mean(cell: str, field: str, form: str) -> str:
+        return format(at_end(records, cell, field).mean(), form)
 
-_HEAD = ["mean share mapped", f"share after {SCANS} scans", "way (m)", "share a 100 m"]
+    return {
+        "mean share mapped": lambda cell: f"{mean_interval(mapped(records, cell)):.3f}",
+        f"share after {SCANS} scans": lambda cell: mean(cell, "mapped", ".3f"),
+        "way (m)": lambda cell: mean(cell, "driven_m_by_scan", ",.0f"),
+        "share a 100 m": lambda cell: f"{mean_interval(mapped_per_metre(records, cell)):.3f}",
+    }
 
 
 def _methods_table(records: Records) -> str:
     """Return a table of every method and what stands beside them."""
-    names = [(robots, f"({m}) {s}", cell_id(robots, m)) for robots in TEAMS for m, s in METHODS.items()]
-    names[len(METHODS) : len(METHODS)] = [(1, f"{s}, not the paper's", cell_id(1, s)) for s in OTHERS]
-    rows = [_row(records, cell, [str(robots), name]) for robots, name, cell in names]
-    return markdown_table(["robots", "method", *_HEAD], rows)
+    rows = [((robots, f"({m}) {s}"), cell_id(robots, m)) for robots in TEAMS for m, s in METHODS.items()]
+    rows[len(METHODS) : len(METHODS)] = [((1, f"{s}, not the paper's"), cell_id(1, s)) for s in OTHERS]
+    return cells_table(["robots", "method"], rows, _columns(records))
 
 
 def _changes_table(records: Records) -> str:
     """Return a table of method (v) with one thing changed, and how much more it maps than it does."""
-    base = mapped(records, cell_id(1, "v"))
-    rows = [[*_row(records, cell_id(1, "v"), ["nothing"]), "1"]]
-    for name, (text, _) in CHANGES.items():
-        cell = cell_id(1, f"v-{name}")
-        rows.append([*_row(records, cell, [text]), f"{ratio_interval(mapped(records, cell), base):.2f}"])
-    return markdown_table(["changed", *_HEAD, "mean share over (v)'s"], rows)
+    best = cell_id(1, "v")
+    rows = [(("nothing",), best), *(((c[0],), cell_id(1, f"v-{name}")) for name, c in CHANGES.items())]
+
+    def over_best(cell: str) -> str:
+        ratio = ratio_interval(mapped(records, cell), mapped(records, best))
+        return "1" if cell == best else f"{ratio:.2f}"
+
+    return cells_table(["changed"], rows, {**_columns(records), "mean share over (v)'s": over_best})
 
 
 EXPERIMENT = Experiment(

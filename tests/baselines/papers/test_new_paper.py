@@ -32,29 +32,23 @@ def experiment(amount: Amount) -> list[CellTrial]:
 """
 CLAIMS = """
 from baselines.experiments.claims import Claim, above, below
-from baselines.experiments.experiment import Records
-from baselines.experiments.statistics import mean_interval, ratio_interval
-from baselines.experiments.tables import markdown_table
+from baselines.experiments.experiment import Records, ratio_of, sample
+from baselines.experiments.statistics import mean_interval
+from baselines.experiments.tables import cells_table
 
 GROUPS = {"more-": "two robots do more than one", "time": "time", "none": "robots do not hit each other"}
-
-def of(records: Records, cell: str, field: str) -> list[float]:
-    return [record[field] for record in records[cell]]
+CELLS = ("robots-2", "robots-1")
 
 def all_claims(records: Records) -> list[Claim]:
-    ratios = {
-        field: ratio_interval(of(records, "robots-2", field), of(records, "robots-1", field))
-        for field in ("scans", "distance_m", "measurements", "t_mission_s")
-    }
-    time = ratios.pop("t_mission_s")
-    claims = [above(f"more-{field}", f"more {field}; ratio", ratio) for field, ratio in ratios.items()]
-    blocked = sum(of(records, "robots-1", "blocked_moves"))
-    claims.append(below("time", "less time; ratio", time, 1.5))
-    return [*claims, Claim("none", "drives of one robot that were blocked", 0, blocked, None, None, True)]
+    more = ("scans", "distance_m", "measurements")
+    claims = [above(f"more-{figure}", ratio_of(records, *CELLS, figure)) for figure in more]
+    claims.append(below("time", ratio_of(records, *CELLS), 1.5))
+    blocked = sample(records, "robots-1", "blocked_moves").sum()
+    return [*claims, Claim("none", 0, blocked, None, None, True, "drives that were blocked")]
 
 def table(records: Records) -> str:
-    rows = [[cell, f"{mean_interval(of(records, cell, 'scans')):.1f}"] for cell in records]
-    return markdown_table(["cell", "scans"], rows)
+    scans = {"scans": lambda cell: f"{mean_interval(sample(records, cell, 'scans')):.1f}"}
+    return cells_table(["cell"], [((cell,), cell) for cell in records], scans)
 """
 FIGURES = """
 from matplotlib.figure import Figure

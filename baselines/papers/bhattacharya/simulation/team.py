@@ -8,21 +8,13 @@ tessellation serve all: the centralised run. Distances are in cells.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
-from baselines.papers.bhattacharya.simulation.belief import (
-    BITS_PER_CELL,
-    BITS_PER_MESSAGE,
-    Fusion,
-    GridBelief,
-    Readings,
-    Scanner,
-    Sensor,
-)
+from baselines.papers.bhattacharya.simulation.belief import GridBelief, Readings, Scanner
 from baselines.strategies.voronoi.controls import (
     CellFunctional,
     coverage_functional,
@@ -36,17 +28,16 @@ from entropy_explore_env.belief.paths.geodesic_cells import (
     new_tessellation,
     tessellate,
 )
-from entropy_explore_env.errors import SettingError
-from entropy_explore_env.settings.validation import (
-    check,
-    check_choice,
-    check_count,
-    check_kind,
-    check_not_negative,
-)
 
 Control = Literal["projected-centroid", "gradient-search", "nearest"]
 Metric = Literal["entropy", "length"]
+
+ETA = 0.01
+"""η, what a cell of a path costs in addition to its entropy. In unknown space a diagonal step costs hardly
+more than a straight one: the entropy part does not know lengths."""
+TAU, TAU_FLOOR = 0.35, 0.33
+"""τ, an entropy in nats from which on a cell counts as uncertain, and τ′, the least density: below τ, so that
+a constant density counts as explored."""
 
 
 @dataclass(frozen=True)
@@ -57,43 +48,23 @@ class Rules:
         control: `projected-centroid` (eqs. 6-8), `gradient-search` (eq. 3), or `nearest`: the uncertain cell
             of the robot's own region that costs least to reach (ours; without one, the projected centroid).
         metric: What paths cost while there is something to explore: `entropy` (sect. 5.2) or `length`.
-        eta: η, what a cell of a path costs in addition to its entropy. In unknown space a diagonal step costs
-            hardly more than a straight one: the entropy part does not know lengths.
-        tau: τ, an entropy in nats from which on a cell counts as uncertain.
-        tau_floor: τ′, the least density; below τ, so that a constant density counts as explored.
         keeps_targets: While exploring, a robot keeps its target until it arrives, sees it, or finds the path
             blocked; else it chooses a new one after every step.
         guarded: While covering, a robot moves only if its own functional falls (ours).
         perfect: Every reading and position is known to all robots at once: one belief.
         phase: Iterations of a phase of the broadcast.
         loss: Probability that a message does not reach a robot.
+        range_cells: R of the sensor.
     """
 
     control: Control = "projected-centroid"
     metric: Metric = "entropy"
-    eta: float = 0.01
-    tau: float = 0.35
-    tau_floor: float = 0.33
     keeps_targets: bool = True
     guarded: bool = True
     perfect: bool = True
     phase: int = 5
     loss: float = 0.0
-    sensor: Sensor = field(default_factory=Sensor)
-    fusion: Fusion = field(default_factory=Fusion)
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_choice(self, "control", Control)
-        check_choice(self, "metric", Metric)
-        check(self, "eta", "a number from 1e-6 to 1e3", lambda v: 1e-6 <= v <= 1e3)
-        check(self, "tau", "a number from 1e-6 to ln 2", lambda v: 1e-6 <= v <= 0.6931)
-        check(self, "tau_floor", "a number above 0 and below tau", lambda v: 0.0 < v < self.tau)
-        for name in ("keeps_targets", "guarded", "perfect"):
-            check_kind(self, name, bool)
-        check_count(self, "phase", 1, 10**6)
-        check_not_negative(self, "loss")
-        check(self, "loss", "a number from 0 to 1", lambda v: v <= 1.0)
+    range_cells: float = 60.0
 
 
 class Planner:
@@ -114,7 +85,7 @@ class Planner:
     def _metric(self) -> tuple[float, bool]:
         """What a voxel edge of path costs in addition, and whether costs are lengths."""
         by_length = self.explored or self.rules.metric == "length"
-        return (0.0, True) if by_length else (self.rules.eta, False)
+        return (0.0, True) if by_length else (ETA, False)
 
     def update(self, places: np.ndarray) -> None:
         """Tessellate from the robots' cells (A,), unless nothing has changed since."""
@@ -122,7 +93,7 @@ class Planner:
         if key == self._of:
             return
         self._of, self._functionals, rules = key, None, self.rules
-        self.density = np.maximum(self.belief.entropy, np.float32(rules.tau_floor))
+        self.density = np.maximum(self.belief.entropy, np.float32(TAU_FLOOR))
         while True:
             length_cost, by_length = self._metric
             cell_costs = np.ones_like(self.density) if by_length else self.belief.entropy.copy()
@@ -132,15 +103,15 @@ class Planner:
             tessellate(self.space, cell_costs, places, length_cost, by_length)
             self.tessellations += 1
             cells = [np.flatnonzero(self.space.cells == robot) for robot in range(self._robots)]
-            found = [projected_centroid(cell, self.density, rules.tau) for cell in cells]
+            found = [projected_centroid(cell, self.density, TAU) for cell in cells]
             self.targets, flat = np.array(found, np.int64), self.density.reshape(-1)
-            self.uncertain = np.array([np.count_nonzero(flat[cell] >= rules.tau) for cell in cells])
+            self.uncertain = np.array([np.count_nonzero(flat[cell] >= TAU) for cell in cells])
             explored = not self.uncertain.any()
             if explored == self.explored:
                 break
             self.explored = explored
         if rules.control == "nearest" and not explored:
-            near = [nearest_uncertain(cell, self.space.costs, self.density, rules.tau) for cell in cells]
+            near = [nearest_uncertain(cell, self.space.costs, self.density, TAU) for cell in cells]
             self.targets = np.where(np.array(near) == UNREACHED, self.targets, near)
 
     def functionals(self) -> np.ndarray:
@@ -182,13 +153,9 @@ class Trace:
     """Cells that can be reached and are uncertain, in the belief of the robot with the most of them."""
     functional: list[float] = field(default_factory=list)
     """The coverage functional, where it was computed; else NaN."""
-    entropy: list[float] = field(default_factory=list)
-    """Entropy of robot 0's map in nats, after the filter."""
     seconds: list[float] = field(default_factory=list)
     """Processor time of tessellations and controls of all robots."""
     tessellations: list[int] = field(default_factory=list)
-    bits: list[int] = field(default_factory=list)
-    """Sent so far by all robots."""
     explored_at: int | None = None
     ended: str = "cut off"
     """`converged`, `cycle` or `cut off`."""
@@ -210,19 +177,14 @@ class Simulation:
             rules: What they do.
             known: Whether they know the plan from the beginning.
             seed: Of lost messages.
-
-        Raises:
-            SettingError: A start is occupied.
         """
-        if occupied.reshape(-1)[list(starts)].any():
-            raise SettingError("starts", list(starts), "free cells")
         self.occupied, self.rules, self.known = occupied, rules, known
         self.places = np.array(starts, np.int64)
         robots = len(self.places)
         count = 1 if rules.perfect or known else robots
-        beliefs = [GridBelief(occupied.shape, rules.fusion) for _ in range(count)]
+        beliefs = [GridBelief(occupied.shape) for _ in range(count)]
         self.planners = [Planner(belief, rules, robots) for belief in beliefs]
-        self._scanner = Scanner(occupied, rules.sensor)
+        self._scanner = Scanner(occupied, rules.range_cells)
         self._still_iterations = 0
         self._last_heard_at = np.tile(self.places, (robots, 1))
         self._paths: list[np.ndarray] = [np.zeros(0, np.int64)] * robots
@@ -232,18 +194,19 @@ class Simulation:
         self._sensing = [Readings(occupied.size) for _ in range(buffers)]
         self._broadcast = [Readings(occupied.size) for _ in range(buffers)]
         self._received = np.ones((robots, robots), bool)
-        self.trace, self._bits = Trace(), 0
+        self.trace = Trace()
         if known:
             belief = self.planners[0].belief
             belief.probability[:] = occupied.reshape(-1)
             belief.entropy[:] = 0.0
 
-    def run(self, limit: int, every: int = 0) -> Trace:
+    def run(self, limit: int, every: int = 0, after_step: Callable[[bool], None] | None = None) -> Trace:
         """Iterate until no robot moves any more, positions in a known plan repeat, or the limit is reached.
 
         Args:
             limit: Most iterations.
             every: Iterations between entries of the coverage functional, which costs extra; 0 = none.
+            after_step: Called after each iteration with whether the run goes on.
         """
         seen: dict[tuple[int, ...], int] = {}
         for iteration in range(limit):
@@ -253,7 +216,10 @@ class Simulation:
                     self.trace.ended, self.trace.cycle = "cycle", iteration - seen[key]
                     break
                 seen[key] = iteration
-            if not self.step(bool(every) and iteration % every == 0):
+            goes_on = self.step(bool(every) and iteration % every == 0)
+            if after_step is not None:
+                after_step(goes_on)
+            if not goes_on:
                 self.trace.ended = "converged"
                 break
         return self.trace
@@ -280,8 +246,6 @@ class Simulation:
             trace.explored_at = len(trace.places) - 1
         counts = [int(planner.uncertain.sum()) for planner in self.planners]
         trace.uncertain.append(max(counts))
-        trace.entropy.append(float(self.planners[0].belief.entropy.sum(dtype=np.float64)))
-        trace.bits.append(self._bits)
         self._still_iterations = 0 if moved or not explored else self._still_iterations + 1
         return self._still_iterations < (
             1 if len(self.planners) == 1 else 2 * self.rules.phase
@@ -302,12 +266,12 @@ class Simulation:
                 self._broadcast[robot].clear()
                 both = self._sensing[robot], self._broadcast[robot]
                 self._broadcast[robot], self._sensing[robot] = both
-                self._received[robot] = self._broadcast[robot].count == 0
+                self._received[robot] = not self._broadcast[robot].times.any()
         for robot in range(robots):
             scan = self._scanner.scan(int(self.places[robot]))
             self.planners[robot if len(self.planners) > 1 else 0].belief.fuse_scan(scan)
             if len(self.planners) > 1:
-                self._sensing[robot].add(scan, self.rules.fusion)
+                self._sensing[robot].add(scan)
         if len(self.planners) > 1:
             for robot in range(robots):
                 self._send(robot)
@@ -315,7 +279,6 @@ class Simulation:
     def _send(self, sender: int) -> None:
         """Broadcast a buffer and a position; a robot that has received the buffer ignores it."""
         message = self._broadcast[sender]
-        self._bits += BITS_PER_MESSAGE + message.count * BITS_PER_CELL
         for mate in range(len(self.places)):
             if mate == sender or self._rng.random() < self.rules.loss:
                 continue
@@ -348,7 +311,7 @@ class Simulation:
         return step
 
     def _uncertain(self, planner: Planner, cell: int) -> bool:
-        return bool(planner.belief.entropy.reshape(-1)[cell] >= self.rules.tau)
+        return bool(planner.belief.entropy.reshape(-1)[cell] >= TAU)
 
     def _keeps_target(self, planner: Planner, robot: int) -> bool:
         """Whether a robot keeps its target: not reached, not seen yet if that is the aim, and not blocked."""

@@ -5,19 +5,26 @@ from __future__ import annotations
 import pytest
 
 from baselines.experiments.statistics import Interval
-from baselines.papers.bhattacharya.claims import all_claims, first_floor, interval
-from baselines.papers.bhattacharya.missions import (
+from baselines.papers.bhattacharya.claims import (
+    all_claims,
+    channel_claims,
+    channel_table,
+    first_floor,
+    flying_table,
+    interval,
+)
+from baselines.papers.bhattacharya.sweep import (
     CHANNELS,
+    CONTROLS,
+    FLOORS,
     LOSSES,
     RIVALS,
-    channel_claims,
     channel_id,
-    channel_table,
+    coverage_id,
+    exploration_id,
     flying_id,
-    flying_table,
     mission_cells,
 )
-from baselines.papers.bhattacharya.sweep import CONTROLS, FLOORS, coverage_id, exploration_id
 
 SPLITS = {"band": {"plain": 0.2, "0.01": 1.05}, "patch": {"plain": 1.0, "0.01": 0.4}}
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from baselines.experiments.claims import Claim
+from baselines.experiments.claims import Claim, told
 from baselines.experiments.mission import mission_record, scripted
 from baselines.experiments.rows import Record
 from baselines.papers.rocha04 import EXPERIMENT
@@ -59,7 +59,7 @@ PAPER = as_the_paper_says()
 
 
 def claims_of(records: dict[str, list[Record]]) -> dict[str, Claim]:
-    claims = all_claims(records)
+    claims = told(all_claims(records), EXPERIMENT.groups)
     assert len({claim.id for claim in claims}) == len(claims)
     return {claim.id: claim for claim in claims}
 
