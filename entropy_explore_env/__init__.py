@@ -15,6 +15,7 @@ from entropy_explore_env import starting  # noqa: F401 - first, since all that f
 import gymnasium
 import pettingzoo
 
+from entropy_explore_env.belief.belief_map import Map
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv, env, parallel_env
 from entropy_explore_env.envs.rewards import StepFigures
 from entropy_explore_env.envs.single_env import SingleRobotEnv
@@ -29,6 +30,8 @@ from entropy_explore_env.errors import (
     WorldError,
     WorldWarning,
 )
+from entropy_explore_env.explorer.explorer import Explorer
+from entropy_explore_env.explorer.goals import Goal, NoGoal
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView
@@ -66,14 +69,18 @@ __all__ = [
     "EntropyExploreEnv",
     "EntropyExploreError",
     "EntropyExploreVectorEnv",
+    "Explorer",
     "Faults",
     "Fiducials",
+    "Goal",
     "Grid",
     "Localization",
+    "Map",
     "MissingExtraError",
     "MissionEnd",
     "Missions",
     "MoveEnd",
+    "NoGoal",
     "Observation",
     "Outage",
     "RadioFault",

@@ -33,7 +33,7 @@ from baselines.experiments.statistics import Interval, median_interval, median_r
 from baselines.experiments.trials import Cell, How, by_cell, run_cells
 from baselines.strategies import is_learned, make_strategy, resolved
 from entropy_explore_env.errors import SettingError, counted
-from entropy_explore_env.explorer import PlannedRate
+from entropy_explore_env.explorer.planned_rate import PlannedRate
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import SCENARIOS, find_scenario

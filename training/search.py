@@ -42,7 +42,7 @@ from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.worker_pool import Failure, run_each
 from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.explorer import PlannedRate
+from entropy_explore_env.explorer.planned_rate import PlannedRate
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.planner.candidate_features import COLUMNS

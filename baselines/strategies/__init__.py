@@ -13,7 +13,7 @@ from baselines.strategies.protocol import Strategy
 from baselines.strategies.table import ALIASES, CLIFF_STRATEGIES, STRATEGIES
 from entropy_explore_env.command import home_path
 from entropy_explore_env.errors import MissingExtraError, SettingError, did_you_mean
-from entropy_explore_env.explorer import PlannedRate
+from entropy_explore_env.explorer.planned_rate import PlannedRate
 from entropy_explore_env.planner.weights import read_weights
 
 _RECOMMENDED = MappingProxyType({"cliff": "cliff-next-best-view"})

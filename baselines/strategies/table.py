@@ -33,7 +33,7 @@ from baselines.strategies.rules.random_walk import RandomWalk
 from baselines.strategies.rules.raster import Raster
 from baselines.strategies.rules.receding_horizon import RecedingHorizon
 from baselines.strategies.rules.voronoi import VoronoiCoverage
-from entropy_explore_env.explorer import PlannedRate
+from entropy_explore_env.explorer.planned_rate import PlannedRate
 from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.planner.weights import shipped_weights
 

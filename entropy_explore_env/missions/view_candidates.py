@@ -10,6 +10,7 @@ from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
 from entropy_explore_env.planner.model import new_proposers
 from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE, Kind
+from entropy_explore_env.planner.thresholds import NO_GAIN_BITS
 from entropy_explore_env.settings.scenario import Scenario
 
 _NO_CEILING = np.zeros(0, np.bool_)
@@ -79,6 +80,11 @@ class ViewProposer:
         )
         parts = (self._features[robot].reshape(-1), self._context[robot], self._overlaps[robot].reshape(-1))
         propose_to(params, robot, about, proposer, parts)
+
+    def found_nothing(self, robot: int) -> bool:
+        """Return whether nothing is expected of any viewpoint that was evaluated for a robot last."""
+        first = self._candidates[robot, 0]
+        return bool(first["bits"] <= NO_GAIN_BITS and self._experience[robot]["blocked"] == 0)
 
     def features(self, robot: int) -> np.ndarray:
         """Return (K, F) float32 of the candidates proposed to a robot last: `candidate_features.FEATURES`."""

@@ -98,6 +98,10 @@ class Driver(ABC):
         self._trails = [Trail() for _ in range(scenario.robots)]
         self._back_off_rng = rng.spawn(1)[0] if scenario.drifts and self.backs_off else None
 
+    def found_nothing(self, robot: int) -> bool:
+        """Return whether the rule gave a robot no viewpoint at its latest decision, so that it wanders."""
+        return self._trails[robot].random is not None
+
     @abstractmethod
     def decide(self, view: RobotKnowledge) -> np.ndarray | None:
         """Return the viewpoint (5,) by the rule, map frame; None = the rule gives none."""

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from baselines.experiments.mission import run_mission, scripted
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.explorer import PlannedRate, explores_frontiers
+from entropy_explore_env.explorer.planned_rate import PlannedRate, explores_frontiers
 from entropy_explore_env.planner.tour import SharedTour, Tour
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.settings.changes import with_settings

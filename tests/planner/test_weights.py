@@ -13,7 +13,7 @@ import pytest
 from baselines.experiments.mission import run_mission, scripted_env
 from baselines.strategies import make_strategy
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.explorer import PlannedRate
+from entropy_explore_env.explorer.planned_rate import PlannedRate
 from entropy_explore_env.planner.candidate_features import COLUMNS, FEATURES
 from entropy_explore_env.planner.weights import PlannerWeights, read_weights, shipped_weights
 from entropy_explore_env.settings.changes import with_settings

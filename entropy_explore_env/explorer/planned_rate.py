@@ -79,3 +79,9 @@ class PlannedRate:
         features = self._proposer.features(view.robot)
         counts = np.array([len(proposed)], np.int64)
         return proposed[self.weights.choices(features[None], counts)[0]].copy()
+
+    def found_nothing(self, robot: int) -> bool:
+        """Return whether nothing that is worth a drive was found for a robot at its latest decision."""
+        if self._frontiers[robot % len(self._frontiers)]:
+            return self._tours.found_nothing(robot)
+        return self._proposer.found_nothing(robot)

@@ -7,7 +7,7 @@ import pytest
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies.rules.nearest_frontier import NearestFrontier
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.explorer import PlannedRate
+from entropy_explore_env.explorer.planned_rate import PlannedRate
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.settings.changes import with_settings

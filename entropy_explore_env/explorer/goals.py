@@ -1,0 +1,59 @@
+"""What an Explorer asks, and what it answers: a goal, or why there is none."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.settings.scenario import Scenario
+
+
+class Why(enum.Enum):
+    """What a goal is for; the value is a sentence for people."""
+
+    EXPLORES = "A scan from there is expected to see what is unknown."
+    PASSES = "It lies on the way to what is unknown."
+    GIVES_WAY = "The robot makes room for a teammate."
+
+
+class NoGoal(enum.Enum):
+    """Why there is no goal; the value is a sentence for people."""
+
+    ALL_SEEN = "Nothing that is known to be free lies beside what is unknown."
+    OUT_OF_REACH = "What is unknown cannot be reached, or was looked at in vain."
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """Where a robot goes next.
+
+    Attributes:
+        viewpoint: (5,) x, y, z, yaw, pitch, map frame.
+        path: (N, 3) points to which to drive straight, one after the other, through what is believed free; it
+            ends at the viewpoint, or as near as a path is known.
+        expected_bits: Bits that a scan at the viewpoint should bring.
+        seconds: Until that scan is taken.
+        why: What it is for.
+    """
+
+    viewpoint: np.ndarray
+    path: np.ndarray
+    expected_bits: float
+    seconds: float
+    why: Why
+
+
+class Decider(Protocol):
+    """A strategy: see docs/own_strategy.md. Where it has `choose_all`, that is called with the one view."""
+
+    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """Begin, or begin anew in another grid."""
+        ...
+
+    def choose(self, view: RobotView) -> np.ndarray:
+        """Return the viewpoint (5,) of a robot."""
+        ...

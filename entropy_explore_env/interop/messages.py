@@ -1,0 +1,70 @@
+"""Fields of ROS's messages as arrays and poses; whatever class has the fields will do.
+
+A pose here is (x, y, z, yaw, pitch): metres, radians, pitch downwards, as everywhere in the library.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from entropy_explore_env.errors import SettingError
+
+_LEVEL = 1e-3
+"""Largest x and y of the quaternion of a map that lies level."""
+
+
+class GridMessage(NamedTuple):
+    """An OccupancyGrid."""
+
+    grid: np.ndarray
+    """(X, Y) int8 percent; -1 = unknown."""
+    origin: tuple[float, float, float]
+    """Its corner: x, y, yaw."""
+    resolution_m: float
+    bottom_m: float
+    """Height z of its corner."""
+
+
+def grid_of_message(message: Any) -> GridMessage:  # noqa: ANN401 - any class with the fields
+    """Return the content of an OccupancyGrid, whose rows run along x.
+
+    Raises:
+        SettingError: It lacks a field, its data do not fit its size, or it does not lie level.
+    """
+    try:
+        about, rows = message.info, np.asarray(message.data)
+        width, height, at = int(about.width), int(about.height), about.origin
+        turn = (at.orientation.x, at.orientation.y, at.orientation.z, at.orientation.w)
+        corner = (float(at.position.x), float(at.position.y), float(at.position.z))
+        resolution_m = float(about.resolution)
+    except (AttributeError, TypeError, ValueError):
+        raise SettingError("message", type(message).__name__, "a nav_msgs/OccupancyGrid") from None
+    if width * height < 1 or rows.shape != (width * height,):
+        raise SettingError("message.data", rows.shape, f"{width} × {height} numbers, as info says")
+    if abs(turn[0]) > _LEVEL or abs(turn[1]) > _LEVEL:
+        raise SettingError("message.info.origin", turn, "an orientation about z alone")
+    grid = np.ascontiguousarray(rows.astype(np.int8, copy=False).reshape(height, width).T)
+    yaw = 2.0 * math.atan2(float(turn[2]), float(turn[3]))
+    return GridMessage(grid, (corner[0], corner[1], yaw), resolution_m, corner[2])
+
+
+def pose_of(position: Any, orientation: Any) -> np.ndarray:  # noqa: ANN401
+    """Return the pose (5,) of a position and a quaternion; roll is left out."""
+    x, y, z, w = (float(getattr(orientation, axis)) for axis in "xyzw")
+    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    pitch = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
+    return np.array([float(position.x), float(position.y), float(position.z), yaw, pitch])
+
+
+def quaternion_of(yaw: float, pitch: float = 0.0) -> tuple[float, float, float, float]:
+    """Return the quaternion (x, y, z, w) of a yaw and a pitch, which is downwards (REP-103)."""
+    half_yaw, half_pitch = 0.5 * yaw, 0.5 * pitch
+    return (
+        -math.sin(half_yaw) * math.sin(half_pitch),
+        math.cos(half_yaw) * math.sin(half_pitch),
+        math.sin(half_yaw) * math.cos(half_pitch),
+        math.cos(half_yaw) * math.cos(half_pitch),
+    )
