@@ -21,9 +21,10 @@ import numpy as np
 
 from baselines.strategies.metrics import Options, Value
 from baselines.strategies.rules.coordinated_frontier import taken
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge, stays, under_way, voxel_of
+from entropy_explore_env.frontiers.knowledge import stays, under_way, voxel_of
 from entropy_explore_env.planner.scene import Scene
 from entropy_explore_env.planner.stops import apart_m
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.settings.scenario import Scenario
 

@@ -1,125 +1,17 @@
-"""What one robot knows, as rules and planners read it: the missions' `RobotView` has this form.
-
-Frontiers and the planner lie below missions and also serve robots outside of them: they need this form alone.
-"""
+"""What rules read off what a robot knows: its belief, its voxel, what teammates do, a random viewpoint."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Protocol
 
 import numpy as np
 
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.visibility import CONE, cone_of
-from entropy_explore_env.robots.motion import MoveEnd, driving_time
+from entropy_explore_env.robots.knowledge import RobotKnowledge, TeammateView
+from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.settings.robot_kind import RobotKind
-from entropy_explore_env.settings.scenario import Scenario
-
-
-class TeammateKnowledge(Protocol):
-    """What a robot last heard of a teammate; times are -1 s where it heard nothing.
-
-    Attributes:
-        heard_s: When the last message was sent that arrived.
-        pose: (5,) the teammate's pose then, map frame.
-        announced_s: When the last announcement was sent that arrived.
-        viewpoint: (5,) the announced viewpoint, map frame.
-        depth_m: Mean measured distance of the teammate's latest scan then.
-        half_angle_rad: Largest angle of a measured ray from its gaze.
-        silent: Whether the teammate counts as silent now.
-    """
-
-    @property
-    def heard_s(self) -> float: ...
-    @property
-    def pose(self) -> np.ndarray: ...
-    @property
-    def announced_s(self) -> float: ...
-    @property
-    def viewpoint(self) -> np.ndarray: ...
-    @property
-    def depth_m(self) -> float: ...
-    @property
-    def half_angle_rad(self) -> float: ...
-    @property
-    def silent(self) -> bool: ...
-
-
-class ScanKnowledge(Protocol):
-    """A robot's latest scan.
-
-    Attributes:
-        utility_bits: (R,) bits that each ray took from the robot's own map.
-    """
-
-    @property
-    def utility_bits(self) -> np.ndarray: ...
-
-
-class RobotKnowledge(Protocol):
-    """What one robot knows at one of its decisions; map frame, metres, radians.
-
-    Attributes:
-        robot: Number of the robot.
-        scenario: The public settings.
-        kind: Its body and its sensor.
-        planar: Whether it stays in its plane.
-        level: Whether it never looks up or down.
-        time_s: Simulated time.
-        under_way: Whether it decides while it drives.
-        since_scan_m: Distance driven since its latest scan.
-        pose: (5,) x, y, z, yaw, pitch, as it believes.
-        covariance: (4, 4) of x, y, z and yaw; zeros where the pose is exact.
-        mean: (X, Y, Z) float32, expected coverage.
-        precision: (X, Y, Z) float32, 1/σ² of it.
-        depth_m: Mean measured distance of its latest scan.
-        half_angle_rad: Largest angle of a measured ray of its latest scan from the gaze.
-        scan: Its latest scan.
-        move_end: Why its latest drive ended.
-        ceiling: (X, Y) int32, lowest layer of the no-fly zone; None = there is none.
-        teammates: Number of a teammate → what was heard of it.
-    """
-
-    @property
-    def robot(self) -> int: ...
-    @property
-    def scenario(self) -> Scenario: ...
-    @property
-    def kind(self) -> RobotKind: ...
-    @property
-    def planar(self) -> bool: ...
-    @property
-    def level(self) -> bool: ...
-    @property
-    def time_s(self) -> float: ...
-    @property
-    def under_way(self) -> bool: ...
-    @property
-    def since_scan_m(self) -> float: ...
-    @property
-    def pose(self) -> np.ndarray: ...
-    @property
-    def covariance(self) -> np.ndarray: ...
-    @property
-    def mean(self) -> np.ndarray: ...
-    @property
-    def precision(self) -> np.ndarray: ...
-    @property
-    def depth_m(self) -> float: ...
-    @property
-    def half_angle_rad(self) -> float: ...
-    @property
-    def scan(self) -> ScanKnowledge: ...
-    @property
-    def move_end(self) -> MoveEnd: ...
-    @property
-    def ceiling(self) -> np.ndarray | None: ...
-    @property
-    def teammates(self) -> Mapping[int, TeammateKnowledge]: ...
-
 
 _DRAWS = 64
 """Places that are drawn until one lies within reach."""
@@ -139,7 +31,7 @@ def voxel_of(view: RobotKnowledge, pose: np.ndarray) -> int:
     return int(np.ravel_multi_index(tuple(indices), grid.shape))
 
 
-def teammates_that_share(view: RobotKnowledge) -> Mapping[int, TeammateKnowledge]:
+def teammates_that_share(view: RobotKnowledge) -> Mapping[int, TeammateView]:
     """Return the teammates whose scans may reach the robot: none that is silent.
 
     Where the channel carries no scans there are none: what others see the robot has to see itself.
@@ -149,7 +41,7 @@ def teammates_that_share(view: RobotKnowledge) -> Mapping[int, TeammateKnowledge
     return {mate: seen for mate, seen in view.teammates.items() if not seen.silent}
 
 
-def under_way(view: RobotKnowledge, mate: TeammateKnowledge, robot: int) -> bool:
+def under_way(view: RobotKnowledge, mate: TeammateView, robot: int) -> bool:
     """Whether a teammate, by what was heard of it, is on its way to the viewpoint that it announced.
 
     It is until a scan from there is heard, or until so much time has passed that it must have arrived: then
@@ -168,13 +60,13 @@ def under_way(view: RobotKnowledge, mate: TeammateKnowledge, robot: int) -> bool
     return apart_m > view.scenario.grid.voxel_size_m
 
 
-def stays(view: RobotKnowledge, mate: TeammateKnowledge) -> bool:
+def stays(view: RobotKnowledge, mate: TeammateView) -> bool:
     """Whether a teammate waits: the viewpoint that it announced is where it was before."""
     apart_m = float(np.linalg.norm(mate.pose[:3] - mate.viewpoint[:3]))
     return apart_m < 0.5 * view.scenario.grid.voxel_size_m
 
 
-def announced_cone(grid: Grid, mate: TeammateKnowledge) -> np.void:
+def announced_cone(grid: Grid, mate: TeammateView) -> np.void:
     """Return the CONE that a teammate announced, in grid units: V(Yˢ, r̂, α̂) (RochaMI)."""
     cones = np.zeros(1, CONE)
     depth = mate.depth_m / grid.voxel_size_m

@@ -13,7 +13,6 @@ from scipy import ndimage
 
 from entropy_explore_env.frontiers.blocks import NONE, UNEXPLORED, replace_unreached
 from entropy_explore_env.frontiers.frontier_map import BATCH_CELLS, FrontierConfig, FrontierMap
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.frontiers.ray_tree import yaws_around
 from entropy_explore_env.frontiers.terrain_map import (
     fill_column_costs,
@@ -32,6 +31,7 @@ from entropy_explore_env.frontiers.terrain_visibility import (
     half_widths,
     mean_ground,
 )
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
 

@@ -26,7 +26,6 @@ from entropy_explore_env.frontiers.blocks import (
     replace_unreached,
 )
 from entropy_explore_env.frontiers.frontier_map import BATCH_CELLS, FrontierConfig, FrontierMap
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.frontiers.ray_tree import grow_tree, imagined_pitches, rays_around, rays_towards
 from entropy_explore_env.frontiers.visibility import count_crossed, count_from, count_in_ball, raise_bounds
 from entropy_explore_env.frontiers.voxel_map import (
@@ -41,6 +40,7 @@ from entropy_explore_env.frontiers.voxel_map import (
     voxels_around,
 )
 from entropy_explore_env.frontiers.voxel_states import new_states
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
 

@@ -16,144 +16,49 @@ from entropy_explore_env.missions.rules import Rules
 from entropy_explore_env.missions.silence import is_silent
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.planner.records import Kind
+from entropy_explore_env.robots.knowledge import RobotKnowledge, ScanView, TeammateView, place_text
 from entropy_explore_env.robots.landmarks import LANDMARK
 from entropy_explore_env.robots.localization import believed_point
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.settings.robot_kind import RobotKind
-from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.world import no_fly_mask
 
 
-@dataclass(frozen=True, eq=False)
-class ScanView:
-    """A robot's latest scan, R rays. Before the first one, all `returned` are 0.
-
-    Equal only to itself, as other views.
-
-    Attributes:
-        pose: (5,) where it was taken: x, y, z, yaw, pitch.
-        range_m: (R,) measured distances; 0 where nothing was measured.
-        returned: (R,) int8, a `Return` each: nothing, free up to the range, hit.
-        utility_bits: (R,) what each ray brought to the robot's own map.
-    """
-
-    pose: np.ndarray
-    range_m: np.ndarray
-    returned: np.ndarray
-    utility_bits: np.ndarray
-
-    def __repr__(self) -> str:
-        """From where it was taken, and how much it brought."""
-        return (
-            f"ScanView({len(self.range_m)} rays from {_place(self.pose)}, {self.utility_bits.sum():.6g} bits)"
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class TeammateView:
-    """What a robot last heard of a teammate; times are -1 and the rest 0 if it never heard.
-
-    Equal only to itself, as other views.
-
-    A teammate that has not been heard for long (`Channel.silent_after_s`) counts as silent: it is out of
-    reach, or works no more. Where it was last heard it may still stand; what it announced is not kept, so
-    that its place is free for others.
-
-    Attributes:
-        heard_s: When the last message was sent that reached the robot.
-        pose: (5,) where the teammate was then: x, y, z, yaw, pitch.
-        announced_s: When the last announcement was sent that reached the robot.
-        viewpoint: (5,) the viewpoint that it announced: x, y, z, yaw, pitch.
-        depth_m: r̂, mean measured distance of the teammate's latest scan then.
-        half_angle_rad: α̂, largest angle of a measured ray from its gaze.
-        silent: Whether it was heard once, and counts as silent now: `announced_s` is -1 then, `viewpoint`,
-            `depth_m` and `half_angle_rad` are 0.
-    """
-
-    heard_s: float
-    pose: np.ndarray
-    announced_s: float
-    viewpoint: np.ndarray
-    depth_m: float
-    half_angle_rad: float
-    silent: bool = False
-
-    def __repr__(self) -> str:
-        """Where it was last heard, and where it went."""
-        if self.heard_s < 0.0:
-            return "TeammateView(never heard)"
-        if self.silent:
-            return f"TeammateView(at {_place(self.pose)} at {self.heard_s:g} s, silent since)"
-        announced = "" if self.announced_s < 0.0 else f", to {_place(self.viewpoint)}"
-        return f"TeammateView(at {_place(self.pose)} at {self.heard_s:g} s{announced})"
-
-
-@dataclass(frozen=True, eq=False)
-class RobotView:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RobotView(RobotKnowledge):
     """What one robot knows. Arrays are read-only and change as the mission goes on.
 
     A view is a moment's look at a mission: it is equal only to itself, and hashes by identity.
 
     Attributes:
-        robot: Its number.
-        scenario: The public settings.
-        time_s: Simulated time.
+        robot, scenario, time_s, under_way, since_scan_m, pose, covariance, mean, precision, depth_m,
+            half_angle_rad, scan, move_end, teammates, ceiling: See `RobotKnowledge`.
         deciding: Whether it chooses a viewpoint now.
-        under_way: Whether it does so while it drives on. Where it chooses `target` again, nothing changes.
         speed_m_s: Its speed on its path; 0 while it stands.
-        since_scan_m: Metres that it has driven since its latest scan.
-        pose: (5,) x, y, z, yaw, pitch: map frame, metres, radians, pitch downwards. Where the robot drifts
-            (`Robot.localization`) this is its estimate: its map, scans, target and path are where it believes
-            them to be, and what it chooses is meant so.
-        mean: (X, Y, Z) float32, expected coverage.
-        precision: (X, Y, Z) float32, 1/σ² of it.
         entropy_bits: Entropy of its map.
-        move_end: Why its latest drive ended where it did; UNDER_WAY where it chooses while it drives on.
         target: (5,) the viewpoint that it chose last.
         path: (N, 3) points to which it still means to drive straight, one after the other; none while
             it stands and chooses. Where it plans it is its plan, at whose end the target need not be.
-        depth_m, half_angle_rad: r̂ and α̂ of its latest scan.
-        scan: Its latest scan.
-        teammates: Robot number → what it heard of it.
-        heard: (A,) HEARD, the same as it came, also of teammates that are silent since: for observations.
+        heard: (A,) HEARD, what it heard of teammates as it came, also of those that are silent since: for
+            observations.
         gained_bits: Taken from its map by its own scans since the start.
         heard_bits: Taken from its map by teammates' measurements since the start.
         candidates: (K, 5) the viewpoints that are proposed to it, the planner's own choice first; none where
             actions are no numbers of candidates, or it does not decide.
-        ceiling: (X, Y) int32, in each column the lowest layer of the no-fly zone (an exposure surface
-            is known beforehand); None = no such zone.
-        covariance: (4, 4) float64 of the pose's x, y, z and yaw, m and rad; 0 where it is exact. Of the
-            latest event at which the estimate changed: while the robot drives on it is uncertain by more.
         fiducials_m: (F, 3) places of the fiducials by which it corrects its estimate (`Fiducials`).
         landmarks_m: (N, 3) where it believes the landmarks of its own map to be (`Fiducials.own_number`).
         landmarks: (N,) LANDMARK, the same with all that it knows of them; their true places are not told.
     """
 
-    robot: int
-    scenario: Scenario
-    time_s: float
     deciding: bool
-    under_way: bool
     speed_m_s: float
-    since_scan_m: float
-    pose: np.ndarray
-    mean: np.ndarray
-    precision: np.ndarray
     entropy_bits: float
-    move_end: MoveEnd
     target: np.ndarray
     path: np.ndarray
-    depth_m: float
-    half_angle_rad: float
-    scan: ScanView
-    teammates: dict[int, TeammateView]
     heard: np.ndarray
     gained_bits: float
     heard_bits: float
     candidates: np.ndarray
-    ceiling: np.ndarray | None
     rules: Rules
-    covariance: np.ndarray = field(default_factory=lambda: np.zeros((4, 4)))
     fiducials_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     landmarks_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     landmarks: np.ndarray = field(default_factory=lambda: np.zeros(0, LANDMARK))
@@ -165,27 +70,12 @@ class RobotView:
         who = f"robot_{self.robot} of {self.scenario.robots} in {self.scenario.name!r}"
         return (
             f"RobotView({who}, {self.time_s:g} s, "
-            f"{state}, at {_place(self.pose)}, {x} × {y} × {z} voxels, {self.entropy_bits:.6g} bits)"
+            f"{state}, at {place_text(self.pose)}, {x} × {y} × {z} voxels, {self.entropy_bits:.6g} bits)"
         )
 
     def action_for(self, viewpoint: np.ndarray) -> np.ndarray | np.int64:
         """The action that sends the robot to a viewpoint (5,): see `encode_viewpoint`."""
         return encode_viewpoint(self.rules, self.pose, viewpoint, self.robot, self.candidates)
-
-    @property
-    def kind(self) -> RobotKind:
-        """How it moves and what it senses."""
-        return self.scenario.kind_of(self.robot)
-
-    @property
-    def planar(self) -> bool:
-        """Whether it stays in its plane."""
-        return self.scenario.layer_of(self.kind.robot) is not None
-
-    @property
-    def level(self) -> bool:
-        """Whether it stays in its plane and never looks up or down."""
-        return self.scenario.looks_level(self.kind.robot)
 
     def scan_places(self, path_m: np.ndarray) -> np.ndarray:
         """Where the robot would scan under way on a path from its place, the scan at its end not among them.
@@ -214,11 +104,6 @@ class RobotView:
         grid = self.scenario.grid
         radius = self.kind.robot.planning_radius_m / grid.voxel_size_m
         return no_fly_mask(self.ceiling, grid.shape[2], radius)
-
-
-def _place(pose: np.ndarray) -> str:
-    """The first three numbers of a pose or viewpoint, metres."""
-    return "(" + ", ".join(f"{number:.3g}" for number in pose[:3]) + ") m"
 
 
 def view_of(missions: Missions, mission: int, robot: int) -> RobotView:

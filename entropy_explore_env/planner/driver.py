@@ -27,7 +27,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge, random_viewpoint
+from entropy_explore_env.frontiers.knowledge import random_viewpoint
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.scenario import Scenario
 

@@ -27,12 +27,13 @@ from entropy_explore_env.belief.paths.search import Search, new_search
 from entropy_explore_env.errors import ActionError, SettingError
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
+from entropy_explore_env.frontiers.knowledge import voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.driver import Driver
 from entropy_explore_env.planner.scene import NOWHERE, ROOM, STAY, Goal, Scene, scanned_here
 from entropy_explore_env.planner.stops import apart_m, stop_towards
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.scenario import Scenario
 
 _GAZES = 4

@@ -8,15 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.frontiers.blocks import NONE
-from entropy_explore_env.frontiers.knowledge import (
-    RobotKnowledge,
-    stays,
-    teammates_that_share,
-    under_way,
-    voxel_of,
-)
+from entropy_explore_env.frontiers.knowledge import stays, teammates_that_share, under_way, voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 
 STAY = -2
 """As a goal: the robot stays where it is, and scans."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
+from entropy_explore_env.frontiers.knowledge import voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 
 _WITHIN_REACH = 0.999
 """Share of the reach that is used, so that rounding never moves a place towards the robot."""

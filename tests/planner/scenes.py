@@ -13,8 +13,8 @@ from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_frontiers import BLOCK, VoxelFrontiers
-from entropy_explore_env.missions.view import TeammateView
 from entropy_explore_env.planner.frontier_rule import Scene
+from entropy_explore_env.robots.knowledge import TeammateView
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import find_scenario

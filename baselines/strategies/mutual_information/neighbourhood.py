@@ -11,7 +11,8 @@ from baselines.strategies.mutual_information.candidates import MATE, Body, Facto
 from entropy_explore_env.belief.paths.lattice import new_lattice
 from entropy_explore_env.belief.raycast import Crossing, longest_crossing
 from entropy_explore_env.belief.visibility import CONE, Occlusion, mark_cone
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge, announced_cone, belief_of
+from entropy_explore_env.frontiers.knowledge import announced_cone, belief_of
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.ending import gaussian_entropy_bits
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.validation import check, check_kind, check_not_negative, check_positive

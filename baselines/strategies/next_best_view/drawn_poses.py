@@ -16,10 +16,11 @@ from baselines.strategies.next_best_view.expected_view import (
     occupancy_map,
 )
 from baselines.strategies.next_best_view.pose_samples import drawn_poses, poses_in, reachable_voxels
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge, belief_of
+from entropy_explore_env.frontiers.knowledge import belief_of
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import NOWHERE, Goal, Scene
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import robot_model
 

@@ -16,7 +16,8 @@ from scipy.ndimage import distance_transform_edt
 from baselines.strategies.next_best_view.elevation_view import Camera, Ground, fill_visibility
 from baselines.strategies.next_best_view.expected_view import window_in_reach
 from entropy_explore_env.belief.elevation import ElevationMap, completed, elevation_map
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
+from entropy_explore_env.frontiers.knowledge import voxel_of
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 
 EdgeForm = Literal["line", "polygon"]
 WHEEL_M = 0.2

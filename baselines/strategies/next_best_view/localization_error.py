@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from baselines.strategies.next_best_view.pose_samples import path_points
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge, belief_of
+from entropy_explore_env.frontiers.knowledge import belief_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.viewpoints.expected_localization import Drive, Surveyor, growth_of_error
 
 

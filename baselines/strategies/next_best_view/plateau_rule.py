@@ -18,10 +18,11 @@ from baselines.strategies.next_best_view.ground_map import EdgeForm, GroundMap
 from baselines.strategies.next_best_view.pose_samples import path_points, reachable_voxels, yaws_around
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
+from entropy_explore_env.frontiers.knowledge import voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.driver import Driver, Trail
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.scenario import Scenario
 
 STEEP_RAD = math.radians(60.0)

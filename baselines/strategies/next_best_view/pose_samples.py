@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
+from entropy_explore_env.frontiers.knowledge import voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 
 _NARROWEST_RAD = 0.1
 """Narrower views count as this wide where a robot looks all around."""

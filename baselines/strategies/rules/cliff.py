@@ -23,7 +23,7 @@ from baselines.strategies.next_best_view.plateau_rule import STEEP_RAD, PlateauR
 from baselines.strategies.next_best_view.pose_samples import drawn_poses, poses_in
 from baselines.strategies.next_best_view.rating import pose_distance
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 
 _POSES = 100
 """m, drawn at each decision."""

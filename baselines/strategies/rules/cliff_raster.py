@@ -17,7 +17,7 @@ from baselines.strategies.next_best_view.plateau_rule import PlateauRule
 from baselines.strategies.next_best_view.pose_samples import poses_in
 from baselines.strategies.rules.raster import RasterScan
 from entropy_explore_env.frontiers.blocks import NONE
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.scenario import Scenario
 
 _AHEAD_RAD = math.radians(30.0)

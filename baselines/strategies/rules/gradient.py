@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.planner.driver import Driver, Trail
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.viewpoints.gradient_candidates import steepest_viewpoint
 

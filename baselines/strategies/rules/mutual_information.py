@@ -23,8 +23,9 @@ from collections import deque
 import numpy as np
 
 from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig, Neighbourhood
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge, random_viewpoint
+from entropy_explore_env.frontiers.knowledge import random_viewpoint
 from entropy_explore_env.planner.driver import Driver, Trail
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.scenario import Scenario
 

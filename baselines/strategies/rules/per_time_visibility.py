@@ -30,16 +30,12 @@ from baselines.strategies.metrics import ExplorationConfig
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
-from entropy_explore_env.frontiers.knowledge import (
-    RobotKnowledge,
-    stays,
-    teammates_that_share,
-    under_way,
-)
+from entropy_explore_env.frontiers.knowledge import stays, teammates_that_share, under_way
 from entropy_explore_env.frontiers.terrain_frontiers import TerrainFrontiers
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import ROOM, STAY, Scene
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.scenario import Scenario
 
 

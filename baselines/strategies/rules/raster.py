@@ -15,10 +15,10 @@ import numpy as np
 
 from baselines.strategies.next_best_view.pose_samples import reachable_voxels, yaws_around
 from entropy_explore_env.frontiers.blocks import NONE
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import NOWHERE, Goal, Scene
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
 

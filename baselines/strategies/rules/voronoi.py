@@ -25,8 +25,9 @@ from baselines.strategies.voronoi.controls import CellFunctional, nearest_uncert
 from baselines.strategies.voronoi.territory import Territory
 from entropy_explore_env.belief.paths.geodesic_cells import UNREACHED
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.knowledge import RobotKnowledge, voxel_of
+from entropy_explore_env.frontiers.knowledge import voxel_of
 from entropy_explore_env.planner.driver import Driver
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.scenario import Scenario
 
 Control = Literal["projected-centroid", "gradient-search", "nearest"]

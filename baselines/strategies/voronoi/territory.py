@@ -15,12 +15,8 @@ from entropy_explore_env.belief.entropy import LN2, fill_occupancy_entropy
 from entropy_explore_env.belief.paths.geodesic_cells import extract_path, new_tessellation, tessellate
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.frontiers.knowledge import (
-    RobotKnowledge,
-    belief_of,
-    teammates_that_share,
-    voxel_of,
-)
+from entropy_explore_env.frontiers.knowledge import belief_of, teammates_that_share, voxel_of
+from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import (
     RobotModel,
