@@ -25,7 +25,7 @@ WRONG_IMPORTS = {
     f"{LIBRARY}.robots.channel": (f"{LIBRARY}.robots.motion", "pettingzoo"),
     f"{LIBRARY}.missions.rules": (f"{LIBRARY}.missions.tick", "torch"),
     f"{LIBRARY}.reports.colours": (f"{LIBRARY}.envs.infos", "stable_baselines3"),
-    f"{LIBRARY}.scenario": (f"{LIBRARY}.scenarios", "tests.reference"),
+    f"{LIBRARY}.settings.scenario": (f"{LIBRARY}.settings.scenarios", "tests.reference"),
     f"{LIBRARY}.worlds.recipes.plan": (f"{LIBRARY}.worlds.load", f"{LIBRARY}.worlds.recipes.cave"),
     f"{LIBRARY}.worlds.recipes.cave": (f"{LIBRARY}.worlds.recipes.office",),
     f"{LIBRARY}.worlds.files.voxels": (f"{LIBRARY}.worlds.files.worker", f"{LIBRARY}.worlds.world"),
