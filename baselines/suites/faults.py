@@ -51,19 +51,35 @@ CHANNELS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
         ISOLATED: _ALONE,
     }
 )
-"""Condition → settings of the channel; no robot is lost."""
-CONDITIONS = (*CHANNELS, LOST, LOST_ISOLATED)
+"""Condition → settings of the channel; nothing fails."""
+SENSORS_FAIL, RADIOS_FAIL = "sensors fail", "radios fail"
+FAULTS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {
+        SENSORS_FAIL: {
+            "sensor": {"lost_rays": 0.1, "range_factor": 1.02, "range_bias_m": 0.02, "robots": (0,)},
+            "blind": {"mean_s": 60.0, "lasts_s": 20.0},
+        },
+        RADIOS_FAIL: {
+            "radio": {"garbled": 0.1, "repeated": 0.1, "late": 0.2, "late_s": 5.0, "robots": (0,)},
+            "silent": {"mean_s": 60.0, "lasts_s": 20.0},
+        },
+    }
+)
+"""Condition → faults: robot 0 has a worse sensor, or radio, and all are blind, or silent, for a while."""
+CONDITIONS = (*CHANNELS, *FAULTS, LOST, LOST_ISOLATED)
 
 
 def tasks(quick: bool = False) -> tuple[Task, ...]:
     """Return the tasks in which no robot is lost."""
+    conditions = [(condition, channel, {}) for condition, channel in CHANNELS.items()]
+    conditions += [(condition, {}, faults) for condition, faults in FAULTS.items()]
     return tuple(
         Task(
             task_name(name, robots, condition),
-            (Place(name, _scenario(name, robots, channel), _missions(quick)),),
+            (Place(name, _scenario(name, robots, channel, faults), _missions(quick)),),
         )
         for name, robots in (QUICK_TEAMS if quick else TEAMS)
-        for condition, channel in CHANNELS.items()
+        for condition, channel, faults in conditions
     )
 
 
@@ -191,7 +207,7 @@ def _broken(figures: object) -> bool:
 def _claims_of(times: Times, scenario: str, robots: int, strategy: str) -> list[Claim]:
     team, words = (scenario, robots, strategy), f"{strategy}, {scenario}, {robots} robots"
     alone = {name: LOST_ISOLATED if name == LOST else ISOLATED for name in CONDITIONS}
-    shared = [name for name in CONDITIONS if name not in (ISOLATED, LOST_ISOLATED)]
+    shared = [name for name in CONDITIONS if name not in (ISOLATED, LOST_ISOLATED, SENSORS_FAIL)]
     found = {name: times.told_ratio(*team, name, alone[name]) for name in shared}
     cut = [name for name in shared if times.cut_off(*team, name)]
     lost = {LOST: times.told_ratio(*team, LOST, NOTHING_FAILS)}

@@ -1,4 +1,7 @@
-"""Teams of 1, 2, 4 and 8 robots whose channel carries everything; teams of 4 also with three worse ones."""
+"""Teams of 1, 2, 4 and 8 robots whose channel carries everything; teams of 4 also with worse ones.
+
+In `office-signal` four robots share by the strength of signals, and each has to get the whole map.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,7 @@ MEASURES = (TIME, TIME_90)
 STRATEGIES = suite_names("teams")
 NAMED = ("room-furnished", "office", "office-3d", "cave", "terrain")
 QUICK_NAMED = ("office",)
+BY_SIGNAL = "office-signal"
 SIZES, SIZE_OF_WORSE_CHANNELS = (1, 2, 4, 8), (4,)
 _WHOLE: Mapping[str, Any] = {"burst": 1_000_000, "i_min_bits": 0.0}
 CHANNELS: Mapping[str, Mapping[str, Any]] = {
@@ -32,9 +36,11 @@ def tasks(quick: bool = False) -> tuple[Task, ...]:
     if not quick:
         worlds["warehouse"] = in_world(SCENARIOS["office"], "warehouse")
     starts = QUICK_STARTS if quick else STARTS
-    return tuple(
+    by_signal = SCENARIOS[BY_SIGNAL]
+    channels = tuple(
         task_in(team_name(name, robots) + words, scenario, starts, robots=robots, channel=channel)
         for name, scenario in worlds.items()
         for words, channel in CHANNELS.items()
         for robots in (SIZE_OF_WORSE_CHANNELS if words else SIZES)
     )
+    return (*channels, task_in(team_name(BY_SIGNAL, by_signal.robots), by_signal, starts))

@@ -32,7 +32,6 @@ class ScenarioSettings(TypedDict, total=False):
     split: Literal["train", "validation", "test"]
     robots: int
     start_radius_m: float
-    sigma_prior: float
     decision_period_s: float | None
     track_truth: bool
     robot: Robot | Mapping[str, Any]

@@ -209,7 +209,7 @@ def passes(air, team, mate, place, time_s):
     if shared.line_of_sight:
         return walls_m == 0.0
     exponent, wall_loss = shared.path_loss_exponent, shared.wall_loss_db_per_m
-    return path_loss_db(distance_between(place, there), exponent, wall_loss, walls_m) <= shared.spare_db
+    return path_loss_db(distance_between(place, there), exponent, wall_loss, walls_m) <= shared.budget_db
 
 
 @lean_kernel

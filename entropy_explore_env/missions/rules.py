@@ -52,16 +52,14 @@ PARAMS = record_type(
         ("burst", "i8"),
         ("i_min_bits", "f8"),
         ("i_min_fill", "f8"),  # 0 = I_min stays as it is
-        ("i_min_gain", "f8"),
         ("channel_range_m", "f8"),
         ("line_of_sight", "?"),  # whether messages need it; else, where they pass through air, these:
-        ("spare_db", "f8"),  # Signal.spare_db
+        ("budget_db", "f8"),  # of Signal, as the next two
         ("path_loss_exponent", "f8"),
         ("wall_loss_db_per_m", "f8"),
         ("loss_probability", "f8"),
         ("delay_s", "f8"),
         ("announcements", "?"),
-        ("silent_after_s", "f8"),
         ("phase_s", "f8"),
         ("repeats", "i8"),
         ("summary_every_s", "f8"),  # 0 where no summaries are sent
@@ -127,16 +125,14 @@ def rules_of(scenario: Scenario) -> Rules:
         "burst": min(channel.burst, max(kind.sensor.rays for kind in scenario.kinds)),
         "i_min_bits": channel.i_min_bits,
         "i_min_fill": channel.i_min_fill or 0.0,
-        "i_min_gain": channel.i_min_gain,
         "channel_range_m": channel.range_m,
         "line_of_sight": channel.reach == "line_of_sight",
-        "spare_db": channel.signal.spare_db,
+        "budget_db": channel.signal.budget_db,
         "path_loss_exponent": channel.signal.exponent,
         "wall_loss_db_per_m": channel.signal.wall_loss_db_per_m,
         "loss_probability": channel.loss_probability,
         "delay_s": channel.delay_s,
         "announcements": channel.announcements,
-        "silent_after_s": channel.silent_after_s,
         "phase_s": channel.phase_s,
         "repeats": channel.repeats,
         "summary_every_s": channel.summary_every_s if scenario.shares_summaries else 0.0,
@@ -210,10 +206,10 @@ def localization_params(scenario: Scenario) -> np.ndarray | None:
         kind, own = scenario.kind_of(number), params[number]
         drift, sensor = kind.robot.localization, kind.sensor
         flies = scenario.layer_of(kind.robot) is None
-        for part in ("m", "rad"):
-            own[f"xy_per_{part}"] = getattr(drift, f"xy_m_per_sqrt_{part}") ** 2
-            own[f"z_per_{part}"] = getattr(drift, f"z_m_per_sqrt_{part}") ** 2 if flies else 0.0
-            own[f"yaw_per_{part}"] = getattr(drift, f"yaw_rad_per_sqrt_{part}") ** 2
+        own["xy_per_m"] = drift.xy_m_per_sqrt_m**2
+        own["z_per_m"] = drift.z_m_per_sqrt_m**2 if flies else 0.0
+        own["yaw_per_m"] = drift.yaw_rad_per_sqrt_m**2
+        own["yaw_per_rad"] = drift.yaw_rad_per_sqrt_rad**2
         own["range_m"] = min(fiducials.range_m, sensor.max_range_m)
         own["range_sigma_m"], own["bearing_sigma_rad"] = fiducials.range_sigma_m, fiducials.bearing_sigma_rad
         own["landmark_score"], own["landmarks_apart_m"] = fiducials.own_score, fiducials.own_apart_m

@@ -105,9 +105,7 @@ def share(mission, scan, index, recipients):
         return
     count = select_measurements(scan.utility, params.burst, robot.i_min_bits, scan.order)
     if params.i_min_fill > 0.0:
-        robot.next_i_min_bits = steered_i_min(
-            robot.i_min_bits, scan.utility, params.burst, params.i_min_fill, params.i_min_gain
-        )
+        robot.next_i_min_bits = steered_i_min(robot.i_min_bits, scan.utility, params.burst, params.i_min_fill)
     if count > 0 and params.phase_s == 0.0:
         send_batch(team, mission.maps, clock, in_flight, scan, index, count, recipients)
     elif count > 0:

@@ -1,4 +1,4 @@
-"""When a teammate that was heard counts as silent: see `Channel.silent_after_s`."""
+"""When a teammate that was heard counts as silent: what it announced is free for others then."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import math
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.robots.motion import driving_time
 
+SILENT_AFTER_S = 10.0
+"""A teammate is silent if it is unheard for longer than this, beyond what one decision of it may take."""
 _DETOURS = 2.0
 """Times of the straight drive that a drive may take."""
 
@@ -24,7 +26,7 @@ def is_silent(params, heard, time_s):
         time_s: Now.
     """
     unheard_s = time_s - heard["heard_s"]
-    if heard["heard_s"] < 0.0 or unheard_s <= params["silent_after_s"]:
+    if heard["heard_s"] < 0.0 or unheard_s <= SILENT_AFTER_S:
         return False
     drive_m = 0.0
     if heard["announced_s"] >= 0.0:
@@ -33,7 +35,7 @@ def is_silent(params, heard, time_s):
     drive_s = _DETOURS * driving_time(drive_m, params["max_speed_m_s"], params["acceleration_m_s2"])
     stands_s = math.pi / params["turn_rate_rad_s"] + params["scan_time_s"] + params["blocked_wait_s"]
     message_s = params["phase_s"] + params["summary_every_s"] + params["delay_s"]
-    return unheard_s > params["silent_after_s"] + drive_s + stands_s + message_s
+    return unheard_s > SILENT_AFTER_S + drive_s + stands_s + message_s
 
 
 silent_since = lean_kernel(is_silent)

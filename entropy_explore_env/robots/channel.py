@@ -34,6 +34,8 @@ BITS_PER_MEASUREMENT = 96
 BITS_PER_BATCH = 160
 BITS_PER_ANNOUNCEMENT = 384
 BITS_PER_COVARIANCE = 320
+_I_MIN_GAIN = 0.1
+"""How much a scan changes ln I_min, at most."""
 _LEAST_I_MIN_BITS = 1e-6
 """So low that it forbids nothing, and so high that it is back within some dozen scans."""
 
@@ -137,10 +139,10 @@ def select_measurements(utility, burst, i_min_bits, order):
 
 
 @lean_kernel
-def steered_i_min(i_min_bits, utility, burst, fill, gain):
+def steered_i_min(i_min_bits, utility, burst, fill):
     """I_min after a scan, so that a share of the burst is filled with what is most useful over time.
 
-        ln I_min ← ln I_min + gain · (min(m / (fill · burst), 2) - 1)
+        ln I_min ← ln I_min + 0.1 · (min(m / (fill · burst), 2) - 1)
 
     with m the measurements of the scan that reach I_min: it rests where fill · burst of them do on
     average, so that rich scans fill the burst and poor ones send little, and falls as the map becomes
@@ -151,14 +153,13 @@ def steered_i_min(i_min_bits, utility, burst, fill, gain):
         utility: (R,) float64 bits of each ray; negative for a ray that measured nothing.
         burst: Most measurements of a batch, ≥ 1.
         fill: Share of it, above 0; above 1, poor scans fill it, too.
-        gain: Most change of ln I_min.
     """
     reached = 0
     for bits in utility:
         if bits >= i_min_bits:
             reached += 1
     excess = min(reached / (fill * burst), 2.0) - 1.0
-    return max(i_min_bits * math.exp(gain * excess), _LEAST_I_MIN_BITS)
+    return max(i_min_bits * math.exp(_I_MIN_GAIN * excess), _LEAST_I_MIN_BITS)
 
 
 @lean_kernel

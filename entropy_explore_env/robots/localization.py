@@ -27,10 +27,7 @@ LOCALIZATION_PARAMS = record_type(
         ("xy_per_m", "f8"),
         ("z_per_m", "f8"),
         ("yaw_per_m", "f8"),
-        # the same of a radian turned
-        ("xy_per_rad", "f8"),
-        ("z_per_rad", "f8"),
-        ("yaw_per_rad", "f8"),
+        ("yaw_per_rad", "f8"),  # the same of the yaw, by a radian turned
         # of sightings
         ("range_m", "f8"),
         ("range_sigma_m", "f8"),

@@ -52,8 +52,8 @@ def drift_variances(params, metres, turned):
         turned: Radians, ≥ 0.
     """
     return (
-        params.xy_per_m * metres + params.xy_per_rad * turned,
-        params.z_per_m * metres + params.z_per_rad * turned,
+        params.xy_per_m * metres,
+        params.z_per_m * metres,
         params.yaw_per_m * metres + params.yaw_per_rad * turned,
     )
 

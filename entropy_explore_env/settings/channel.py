@@ -14,39 +14,30 @@ from entropy_explore_env.settings.validation import check, check_choice, check_c
 class Signal:
     """The log-distance path loss with walls (Motley & Keenan 1988; Rappaport 2002, sect. 4.11).
 
-    In decibels, of a message from a robot to a teammate d metres away, with w metres of solid voxels on the
-    straight line between them:
+    In decibels, what the way beyond the first metre takes from a message to a teammate d metres away, with w
+    metres of solid voxels on the straight line between the two:
 
-        received = power_dbm - loss_at_1_m_db - 10 · exponent · log10(max(d, 0.01 m)) - wall_loss_db_per_m · w
+        loss = 10 · exponent · log10(max(d, 0.01 m)) + wall_loss_db_per_m · w
 
-    The teammate hears it where that is at least `threshold_dbm`.
+    The teammate hears it where that is at most `budget_db`.
 
     Attributes:
-        power_dbm: Of the sender, antennas included, -100 to 100.
-        loss_at_1_m_db: In the open, 0 to 200; 40 at 2.4 GHz.
+        budget_db: Loss beyond the first metre at which a message is still understood, -400 to 500: the
+            sender's power, less what the first metre takes (40 dB at 2.4 GHz), less the weakest signal
+            that is understood.
         exponent: How fast the signal weakens in the open, 0 to 10: 2 in free space.
         wall_loss_db_per_m: Of solid voxels, 0 to 1e4.
-        threshold_dbm: The weakest signal that is understood, -300 to 100.
     """
 
-    power_dbm: float = 20.0
-    loss_at_1_m_db: float = 40.0
+    budget_db: float = 40.0
     exponent: float = 2.0
     wall_loss_db_per_m: float = 30.0
-    threshold_dbm: float = -60.0
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check_within(self, "power_dbm", least=-100, most=100)
-        check_within(self, "loss_at_1_m_db", least=0, most=200)
+        check_within(self, "budget_db", least=-400, most=500)
         check_within(self, "exponent", least=0, most=10)
         check_within(self, "wall_loss_db_per_m", least=0, most=1e4)
-        check_within(self, "threshold_dbm", least=-300, most=100)
-
-    @property
-    def spare_db(self) -> float:
-        """What the way beyond the first metre may cost: power - loss at 1 m - threshold."""
-        return self.power_dbm - self.loss_at_1_m_db - self.threshold_dbm
 
 
 @dataclass(frozen=True)
@@ -76,7 +67,6 @@ class Channel:
             that bring less count as redundant, also where robots send summaries.
         i_min_fill: None keeps I_min. A number lets each robot steer its own, from i_min_bits on, so that
             on average over its scans so many bursts of measurements reach it (Rocha04, sect. 5.1.1).
-        i_min_gain: How much a scan with no such measurement, or with twice as many, changes ln I_min.
         range_m: Farthest teammate that hears, 1e-9 to 1e6; inf = all.
         reach: What else a message must come through: `distance` nothing; `line_of_sight` reaches a teammate
             where no solid voxel of the true world is on the straight line between the two; `signal` where
@@ -85,9 +75,6 @@ class Channel:
         loss_probability: Of a message on its way to one teammate.
         delay_s: From sending to hearing, 0 to 3600.
         announcements: Whether robots announce the viewpoints that they choose.
-        silent_after_s: A teammate counts as silent when no message has come from it for longer than this,
-            1e-3 to 1e9, beyond what one decision of it may take (`missions.silence.is_silent`). What it
-            announced is free for others then: `TeammateView.silent`. inf = never.
         phase_s: Length of a phase of the broadcast, 1e-3 to 3600; 0 = batches are sent at once.
         repeats: How often a phase's batches are sent in the next phase, evenly spread over it; 1e-3 s apart
             or more. 1 where batches are sent at once.
@@ -99,14 +86,12 @@ class Channel:
     burst: int = 64
     i_min_bits: float = 0.3219
     i_min_fill: float | None = None
-    i_min_gain: float = 0.1
     range_m: float = math.inf
     reach: Literal["distance", "line_of_sight", "signal"] = "distance"
     signal: Signal = field(default_factory=Signal)
     loss_probability: float = 0.0
     delay_s: float = 0.0
     announcements: bool = True
-    silent_after_s: float = 10.0
     phase_s: float = 0.0
     repeats: int = 1
 
@@ -120,14 +105,12 @@ class Channel:
         if self.i_min_fill is not None:
             check(self, "i_min_fill", "None, or a number above 0 up to 10", lambda v: 0 < v <= 10)
             check(self, "i_min_bits", "above 0 where I_min is steered", lambda v: v > 0)
-        check(self, "i_min_gain", "a number above 0 up to 1", lambda v: 0 < v <= 1)
         check_within(self, "range_m", least=1e-9, most=1e6, inf=True)
         check_choice(self, "reach", Literal["distance", "line_of_sight", "signal"])
         check_kind(self, "signal", Signal)
         check(self, "loss_probability", "a number from 0 to 1", lambda v: 0 <= v <= 1)
         check(self, "delay_s", "a number from 0 to 3600", lambda v: 0 <= v <= 3600)
         check_kind(self, "announcements", bool)
-        check_within(self, "silent_after_s", least=1e-3, most=1e9, inf=True)
         check_within(self, "phase_s", least=1e-3, most=3600, zero=True)
         check_count(self, "repeats", 1, 1000)
         self._check_contents()

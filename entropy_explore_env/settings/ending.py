@@ -14,6 +14,10 @@ BITS_OF_UNIT_GAUSSIAN = 0.5 * math.log2(2.0 * math.pi * math.e)
 """Differential entropy of N(0, 1) in bits: Rocha04, eq. 15 at σ = 1."""
 
 
+SIGMA_PRIOR = 30.0
+"""Standard deviation of the coverage of a voxel that nobody has measured (Rocha04, table 2)."""
+
+
 def gaussian_entropy_bits(sigma: float) -> float:
     """Differential entropy of a Gaussian in bits, log2 √(2πe) + log2 σ (Rocha04, eq. 15)."""
     return BITS_OF_UNIT_GAUSSIAN + math.log2(sigma)
@@ -58,7 +62,8 @@ class Ending:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check(self, "sigma_end", "a number from 1e-4 to 1e4", lambda v: 1e-4 <= v <= 1e4)
+        allowed = f"a number from 1e-4 to below {SIGMA_PRIOR:g}, the σ of what nobody has measured"
+        check(self, "sigma_end", allowed, lambda v: 1e-4 <= v < SIGMA_PRIOR)
         check_choice(self, "termination", Literal["any", "all", "shared"])
         if self.seen_share is not None:
             check(self, "seen_share", "None, or a number above 0 up to 1", lambda v: 0 < v <= 1)

@@ -19,14 +19,6 @@ from entropy_explore_env.settings.scenario import Scenario
 Settings = TypeVar("Settings")
 INFINITY = "inf"
 """JSON has no infinity; where a number belongs, this text stands for it."""
-RENAMED: Mapping[str, Mapping[str, str]] = types.MappingProxyType(
-    {
-        "Scenario": {"others": "extra_kinds", "scored": "track_truth"},
-        "Ending": {"whose": "termination"},
-        "Observation": {"own": "self_state"},
-    }
-)
-"""Class → name of a setting in files of earlier versions → its name now."""
 
 
 def settings_of(scenario: Scenario) -> dict[str, Any]:
@@ -127,11 +119,6 @@ def _part(kind: type, value: Any, name: str) -> Any:  # noqa: ANN401 - an object
     hints = _hints(kind)
     if not isinstance(value, Mapping):
         raise SettingError(name, value, f"an object with the fields of {kind.__name__}")
-    renamed = RENAMED.get(kind.__name__, {})
-    value = {
-        renamed.get(field, field) if renamed.get(field) not in value else field: given
-        for field, given in value.items()
-    }
     for field, given in value.items():
         if field not in hints:
             raise SettingError(

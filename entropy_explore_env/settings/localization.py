@@ -22,8 +22,6 @@ class Localization:
         xy_m_per_sqrt_m: Of x and of y, after a metre driven; 0 to 100.
         z_m_per_sqrt_m: Of the height of a robot that flies, after a metre driven; 0 to 100.
         yaw_rad_per_sqrt_m: Of the yaw, after a metre driven; 0 to 10.
-        xy_m_per_sqrt_rad: Of x and of y, after a turn of a radian; 0 to 100.
-        z_m_per_sqrt_rad: Of the height of a robot that flies, after a turn of a radian; 0 to 100.
         yaw_rad_per_sqrt_rad: Of the yaw, after a turn of a radian; 0 to 10.
         margin_m: How much wider than its body a robot that drifts plans its paths, so that a small error does
             not lead it into a wall; 0 to 100. A voxel's edge or two do, where passages are wide enough; true
@@ -33,8 +31,6 @@ class Localization:
     xy_m_per_sqrt_m: float = 0.0
     z_m_per_sqrt_m: float = 0.0
     yaw_rad_per_sqrt_m: float = 0.0
-    xy_m_per_sqrt_rad: float = 0.0
-    z_m_per_sqrt_rad: float = 0.0
     yaw_rad_per_sqrt_rad: float = 0.0
     margin_m: float = 0.0
 

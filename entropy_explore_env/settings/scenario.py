@@ -6,14 +6,14 @@ import dataclasses
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.action import Action
 from entropy_explore_env.settings.channel import Channel
-from entropy_explore_env.settings.ending import Ending
+from entropy_explore_env.settings.ending import SIGMA_PRIOR, Ending
 from entropy_explore_env.settings.faults import Faults
 from entropy_explore_env.settings.fiducials import Fiducials
 from entropy_explore_env.settings.grid import Grid
@@ -22,7 +22,7 @@ from entropy_explore_env.settings.reward import Reward
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.sensor import RangeSensor
-from entropy_explore_env.settings.validation import check, check_choice, check_count, check_kind, check_within
+from entropy_explore_env.settings.validation import check_choice, check_count, check_kind, check_within
 
 MAX_IN_FLIGHT = 2**24
 """Measurements of delayed messages that may be under way at once."""
@@ -57,7 +57,6 @@ class Scenario:
             with `sensor`, robot a is of kind a mod K. All share one form of action and observation
             (missions/action.py, missions/observation/layout.py).
         start_radius_m: Robots start at most so far from where the first one does; inf = anywhere.
-        sigma_prior: Standard deviation of coverage before any measurement; the mean is ½.
         decision_period_s: A step lasts this long, 1e-3 to 1e5; None = until the next robot has to decide.
         track_truth: Whether the team's joint map, of everything measured, is kept and compared with the
             truth: for figures only, nobody acts on it. It costs one more map a mission. True by itself where
@@ -67,13 +66,15 @@ class Scenario:
             (`Robot.localization`); none by default.
     """
 
+    sigma_prior: ClassVar[float] = SIGMA_PRIOR
+    """Standard deviation of coverage before any measurement; the mean is ½."""
+
     name: str
     grid: Grid
     world: str = "empty"
     split: Literal["train", "validation", "test"] = "train"
     robots: int = 3
     start_radius_m: float = math.inf
-    sigma_prior: float = 30.0
     decision_period_s: float | None = 1.0
     track_truth: bool = False
     robot: Robot = field(default_factory=Robot)
@@ -102,16 +103,11 @@ class Scenario:
         check_choice(self, "split", Literal["train", "validation", "test"])
         check_count(self, "robots", 1, 1000)
         check_within(self, "start_radius_m", least=1e-6, most=1e6, inf=True)
-        check(self, "sigma_prior", "a number from 1e-3 to 1e4", lambda v: 1e-3 <= v <= 1e4)
         if self.decision_period_s is not None:
             check_within(self, "decision_period_s", least=1e-3, most=1e5)
         check_kind(self, "track_truth", bool)
         if self.ending.by_seen:
             object.__setattr__(self, "track_truth", True)
-        if self.ending.sigma_end >= self.sigma_prior:
-            raise SettingError(
-                "Ending.sigma_end", self.ending.sigma_end, f"below sigma_prior = {self.sigma_prior}"
-            )
         if self.observation.overlaps and self.action.kind != "candidates":
             raise SettingError("Observation.overlaps", True, "False, unless Action.kind is 'candidates'")
         for kind in self.kinds:

@@ -7,7 +7,7 @@ import math
 from types import MappingProxyType
 
 from entropy_explore_env.errors import SettingError, one_of
-from entropy_explore_env.settings.channel import Channel
+from entropy_explore_env.settings.channel import Channel, Signal
 from entropy_explore_env.settings.ending import Ending
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.reward import Reward
@@ -23,6 +23,7 @@ COST_PER_S_ALONE = MappingProxyType(
         "room-furnished": 0.000886,
         "box-7x11x5": 0.00727,
         "office": 0.000346,
+        "office-signal": 0.000346,
         "office-3d": 0.000268,
         "corridor": 0.0005,
         "cluttered": 0.000574,
@@ -95,6 +96,22 @@ OFFICE = Scenario(
     ending=Ending(time_limit_s=3600.0),
 )
 """24 × 18 m of rooms and corridors, 2-D."""
+
+OFFICE_SIGNAL = dataclasses.replace(
+    OFFICE,
+    name="office-signal",
+    reward=Reward("team", 0.00037),
+    robots=4,
+    channel=Channel(
+        burst=180,
+        i_min_bits=0.0,
+        reach="signal",
+        signal=Signal(budget_db=25.0, exponent=2.5, wall_loss_db_per_m=60.0),
+    ),
+    ending=Ending(termination="shared", time_limit_s=3600.0),
+)
+"""The same for four robots that have to meet to share: whole scans reach a teammate within 10 m in the open,
+and within 3 m behind 0.2 m of wall. A mission lasts until every robot has the map."""
 
 OFFICE_3D = Scenario(
     name="office-3d",
@@ -274,6 +291,7 @@ SCENARIOS = MappingProxyType(
             ROOM_FURNISHED,
             BOX,
             OFFICE,
+            OFFICE_SIGNAL,
             OFFICE_3D,
             OFFICE_MIXED,
             CORRIDOR,

@@ -71,7 +71,7 @@ def test_a_team_with_faults_conforms(in_this_process: int, period_s: float | Non
 
 @pytest.mark.parametrize("period_s", [None, 1.0])
 def test_a_team_that_drifts_conforms(in_this_process: int, period_s: float | None) -> None:
-    drift = {"xy_m_per_sqrt_m": 0.05, "z_m_per_sqrt_rad": 0.01, "yaw_rad_per_sqrt_m": 0.02}
+    drift = {"xy_m_per_sqrt_m": 0.05, "z_m_per_sqrt_m": 0.01, "yaw_rad_per_sqrt_m": 0.02}
     settings = {
         "robot": {"localization": drift, "redecide": "on_scan"},
         "sensor": {"scan_every_m": 0.4},

@@ -68,7 +68,7 @@ def test_every_scenario_has_an_id_that_pettingzoo_makes(scenario: str, name: str
 
 
 def test_ids_are_those_of_all_scenarios() -> None:
-    assert len({environment_id(scenario) for scenario in SCENARIOS}) == len(SCENARIOS) == 18
+    assert len({environment_id(scenario) for scenario in SCENARIOS}) == len(SCENARIOS) == 19
 
 
 def test_made_by_id_or_by_name_or_by_scenario_plays_the_same() -> None:

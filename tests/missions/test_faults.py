@@ -361,9 +361,9 @@ def test_signals_and_sight_decide_who_hears():
     channels = {
         "distance": {},
         "line_of_sight": {"reach": "line_of_sight"},
-        "through": {"reach": "signal", "signal": {"exponent": 2.0, "threshold_dbm": -42.0}},
-        "not through": {"reach": "signal", "signal": {"exponent": 2.0, "threshold_dbm": -41.0}},
-        "too far": {"reach": "signal", "range_m": 1.9, "signal": {"threshold_dbm": -300.0}},
+        "through": {"reach": "signal", "signal": {"exponent": 2.0, "budget_db": 22.0}},
+        "not through": {"reach": "signal", "signal": {"exponent": 2.0, "budget_db": 21.0}},
+        "too far": {"reach": "signal", "range_m": 1.9, "signal": {"budget_db": 280.0}},
     }
     for name, channel in channels.items():
         for wall in (False, True):

@@ -221,7 +221,7 @@ def test_errors_are_as_large_as_robots_hold_them_to_be(flat):
     The robots begin in the middle of a large box: near its walls, which no estimate leaves, they know more.
     """
     drift = {"xy_m_per_sqrt_m": 0.02, "z_m_per_sqrt_m": 0.03, "yaw_rad_per_sqrt_m": 0.01}
-    drift |= {"xy_m_per_sqrt_rad": 0.01, "yaw_rad_per_sqrt_rad": 0.02}
+    drift |= {"yaw_rad_per_sqrt_rad": 0.02}
     scenario = free_box(
         grid={"shape": (27, 31, 21)},
         robots=1,
@@ -375,10 +375,10 @@ def test_fiducials_where_none_can_be_are_refused_before_anything_changes():
     ("kind", "field", "value"),
     [
         (Localization, "xy_m_per_sqrt_m", -0.1),
-        (Localization, "z_m_per_sqrt_rad", math.inf),
+        (Localization, "z_m_per_sqrt_m", math.inf),
         (Localization, "yaw_rad_per_sqrt_m", math.nan),
         (Localization, "yaw_rad_per_sqrt_rad", 10.1),
-        (Localization, "xy_m_per_sqrt_rad", "0.1"),
+        (Localization, "xy_m_per_sqrt_m", "0.1"),
         (Localization, "z_m_per_sqrt_m", True),
         (Fiducials, "number", -1),
         (Fiducials, "number", 1001),

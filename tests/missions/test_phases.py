@@ -96,7 +96,7 @@ def test_repeats_make_up_for_lost_messages():
 
 
 def test_what_a_broadcast_does_not_reach_is_counted_and_waits_no_longer():
-    for channel in ({"range_m": 0.1}, {"reach": "signal", "signal": {"threshold_dbm": 90.0}}):
+    for channel in ({"range_m": 0.1}, {"reach": "signal", "signal": {"budget_db": -110.0}}):
         missions = played(phase_s=4.0, **channel)
         sent = robots_of(missions, "messages_sent")
         assert sent.min() > 3 and robots_of(missions, "messages_received").sum() == 0

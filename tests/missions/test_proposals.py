@@ -138,7 +138,7 @@ def test_views_hold_the_candidates_and_write_them_as_actions():
 @pytest.mark.parametrize("drift", [0.0, 0.1])
 def test_a_view_is_proposed_what_a_mission_is(drift):
     """From the same random state the same candidates and features, bitwise."""
-    robot = {"localization": {"xy_m_per_sqrt_rad": drift, "yaw_rad_per_sqrt_rad": drift}}
+    robot = {"localization": {"xy_m_per_sqrt_m": drift, "yaw_rad_per_sqrt_rad": drift}}
     fresh = started(free_box(action=ACTION, observation=SEEN, robot=robot), 5)
     proposer = ViewProposer(fresh.scenario, np.random.default_rng(0), overlaps=True)
     proposer._experience["candidates_rng"][:, 0] = splitmix_states(5, 0, Stream.CANDIDATES, 2)

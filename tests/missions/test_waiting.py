@@ -107,7 +107,7 @@ def test_where_nobody_is_in_the_way_waiting_changes_nothing():
 
 def test_a_steered_i_min_goes_with_each_robot_s_own_scans():
     """What is sent follows from the reference: the selection with I_min, which the scan then moves."""
-    channel = {"burst": 6, "i_min_bits": 2.0, "i_min_fill": 0.5, "i_min_gain": 0.3}
+    channel = {"burst": 6, "i_min_bits": 2.0, "i_min_fill": 0.5}
     missions = started(free_box(robots=2, channel=channel), seed=3)
     i_min, sent, scans = [2.0, 2.0], [0, 0], [0, 0]
     rng = np.random.default_rng(1)
@@ -122,7 +122,7 @@ def test_a_steered_i_min_goes_with_each_robot_s_own_scans():
             utility = np.where(measured, missions.state.scan_utility_bits[0, a], -1.0).tolist()
             sent[a] += len(rocha04.select(utility, 6, i_min[a]))
             assert robots[a]["i_min_bits"] == pytest.approx(i_min[a], rel=1e-9)
-            i_min[a] = rocha04.steered(i_min[a], utility, 6, 0.5, 0.3)
+            i_min[a] = rocha04.steered(i_min[a], utility, 6, 0.5, 0.1)
             assert robots[a]["next_i_min_bits"] == pytest.approx(i_min[a], rel=1e-9)
     assert robots["measurements_sent"].tolist() == sent
     assert min(scans) > 10 and i_min[0] != i_min[1]

@@ -86,7 +86,7 @@ def foreseen(covariance, pose, path, viewpoint, every_m, since_m, variances, lan
         viewpoint: (5,).
         every_m: Metres between scans under way.
         since_m: Driven since the latest scan.
-        variances: Of x and y, z, yaw a metre, and the same three a radian.
+        variances: Of x and y, z, yaw a metre, and of yaw a radian.
         landmarks: (F, 3).
         sees: place, landmark → whether a scan there sights it.
         noise: Standard deviations of sightings: along, and of the direction.
@@ -105,10 +105,8 @@ def foreseen(covariance, pose, path, viewpoint, every_m, since_m, variances, lan
     for place, metres in scans:
         carry = np.eye(4)
         carry[0, 3], carry[1, 3] = -(place - at)[1], (place - at)[0]
-        xy, z, yaw = (
-            variances[i] * (metres - done) + variances[i + 3] * (turn if done == 0.0 else 0.0)
-            for i in range(3)
-        )
+        xy, z, yaw = (variance * (metres - done) for variance in variances[:3])
+        yaw += variances[3] * (turn if done == 0.0 else 0.0)
         covariance = carry @ covariance @ carry.T + np.diag([xy, xy, z, yaw])
         for landmark in landmarks:
             away = np.asarray(landmark, float) - place

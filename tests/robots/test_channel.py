@@ -21,7 +21,6 @@ from entropy_explore_env.robots.channel import (
     select_measurements,
     steered_i_min,
 )
-from entropy_explore_env.settings.channel import Signal
 from tests.reference import rocha04
 from tests.reference.scenes import drawn, ray_space, seeds
 
@@ -59,28 +58,27 @@ def test_of_equal_measurements_the_first_are_sent(rays, burst):
     st.integers(1, 45),
     st.floats(1e-6, 5.0),
     st.floats(0.01, 1.0),
-    st.floats(0.01, 1.0),
 )
-def test_i_min_is_steered_like_the_reference(utility, burst, i_min, fill, gain):
-    steered = steered_i_min(i_min, np.asarray(utility, np.float64), burst, fill, gain)
-    assert steered == pytest.approx(rocha04.steered(i_min, utility, burst, fill, gain), rel=1e-12)
+def test_i_min_is_steered_like_the_reference(utility, burst, i_min, fill):
+    steered = steered_i_min(i_min, np.asarray(utility, np.float64), burst, fill)
+    assert steered == pytest.approx(rocha04.steered(i_min, utility, burst, fill, 0.1), rel=1e-12)
 
 
 def test_i_min_by_hand():
     utility = np.array([0.5, 2.0, 0.1, 2.0, -1.0])
-    assert steered_i_min(0.4, utility, 3, 1.0, 0.2) == 0.4  # three reach it: as it should be
-    assert steered_i_min(1.0, utility, 4, 1.0, 0.2) == pytest.approx(math.exp(-0.1))  # two of four
-    assert steered_i_min(1.0, utility, 4, 0.25, 0.2) == pytest.approx(math.exp(0.2))  # two, and one wanted
-    assert steered_i_min(0.1, utility, 1, 1.0, 0.2) == pytest.approx(0.1 * math.exp(0.2))  # four: no more
-    assert steered_i_min(3.0, utility, 4, 0.25, 0.2) == pytest.approx(3.0 * math.exp(-0.2))
-    assert steered_i_min(1e-6, -np.ones(5), 4, 1.0, 1.0) == 1e-6  # nothing measured: not below the least
+    assert steered_i_min(0.4, utility, 3, 1.0) == 0.4  # three reach it: as it should be
+    assert steered_i_min(1.0, utility, 4, 1.0) == pytest.approx(math.exp(-0.05))  # two of four
+    assert steered_i_min(1.0, utility, 4, 0.25) == pytest.approx(math.exp(0.1))  # two, and one wanted
+    assert steered_i_min(0.1, utility, 1, 1.0) == pytest.approx(0.1 * math.exp(0.1))  # four: no more
+    assert steered_i_min(3.0, utility, 4, 0.25) == pytest.approx(3.0 * math.exp(-0.1))
+    assert steered_i_min(1e-6, -np.ones(5), 4, 1.0) == 1e-6  # nothing measured: not below the least
 
 
 def test_i_min_settles_where_so_many_measurements_reach_it():
     """Utilities spread evenly from 0 to 1: 16 of 64 reach ¾."""
     i_min, utility = 3.0, (np.arange(64) + 0.5) / 64
     for _ in range(400):
-        i_min = steered_i_min(i_min, utility, 32, 0.5, 0.1)
+        i_min = steered_i_min(i_min, utility, 32, 0.5)
     assert i_min == pytest.approx(0.75, abs=0.02)
 
 
@@ -180,4 +178,3 @@ def test_path_loss_by_hand():
     assert path_loss_db(100.0, 3.0, 12.0, 0.5) == pytest.approx(66.0)
     assert path_loss_db(1.0, 4.0, 12.0, 0.0) == 0.0
     assert path_loss_db(0.0, 2.0, 12.0, 0.0) == pytest.approx(-40.0)
-    assert Signal(power_dbm=10.0, loss_at_1_m_db=45.0, threshold_dbm=-80.0).spare_db == 45.0

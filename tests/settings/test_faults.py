@@ -37,7 +37,7 @@ TEAM = with_settings(BOX, {"robots": 3})
         (Faults, "stop", None),
         (Faults, "sensor", Outage()),
         (Signal, "exponent", -1.0),
-        (Signal, "threshold_dbm", math.nan),
+        (Signal, "budget_db", math.nan),
         (Signal, "wall_loss_db_per_m", math.inf),
     ],
 )
@@ -92,14 +92,13 @@ def test_they_go_through_json_without_loss():
     )
     channel = {
         "reach": "signal",
-        "signal": {"exponent": 3.0, "threshold_dbm": -75.0},
-        "silent_after_s": math.inf,
+        "signal": {"exponent": 3.0, "budget_db": 55.0},
     }
     scenario = with_settings(
         TEAM, {"faults": faults, "channel": channel, "ending": {"termination": "shared"}}
     )
     again = scenario_from_json(settings_json(scenario))
     assert again == scenario and again.faults == faults
-    assert again.channel.signal == Signal(exponent=3.0, threshold_dbm=-75.0)
+    assert again.channel.signal == Signal(exponent=3.0, budget_db=55.0)
     bare = dataclasses.replace(scenario, faults=Faults())
     assert bare != scenario and scenario_from_json(settings_json(bare)) == bare

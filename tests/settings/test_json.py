@@ -153,18 +153,6 @@ def test_lists_of_parts_come_back_as_tuples():
         assert module._decoded(Team, json.loads(json.dumps(module._encoded(team))), "team") == team
 
 
-def test_settings_of_earlier_versions_load_under_their_new_names():
-    mixed = SCENARIOS["office-mixed"]
-    settings = settings_of(with_settings(mixed, {"track_truth": True, "ending": {"termination": "all"}}))
-    earlier = json.loads(json.dumps(settings))
-    earlier["others"], earlier["scored"] = earlier.pop("extra_kinds"), earlier.pop("track_truth")
-    earlier["ending"]["whose"] = earlier["ending"].pop("termination")
-    earlier["observation"]["own"] = earlier["observation"].pop("self_state")
-    assert settings_of(scenario_of(earlier)) == settings
-    with pytest.raises(SettingError, match=r"Scenario\.others"):
-        scenario_of({**earlier, "extra_kinds": []})
-
-
 def test_any_dataclass_of_settings_comes_back():
     kind = RobotKind(Robot(reach_m=math.inf, motion="planar"), RangeSensor(field_of_view_rad=(1.5, 0.25)))
     assert dataclass_of(RobotKind, json.loads(json.dumps(json_of(kind), allow_nan=False))) == kind

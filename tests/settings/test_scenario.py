@@ -104,7 +104,6 @@ REFUSED = {
     (Channel, "burst"): (*COUNT, 1_000_001),
     (Channel, "i_min_bits"): (*NOT_NEGATIVE, 1.1e6),
     (Channel, "i_min_fill"): ("1", True, NAN, 0.0, -0.5, 10.01, INF),
-    (Channel, "i_min_gain"): (*POSITIVE, 1.01, INF),
     (Channel, "range_m"): (*POSITIVE, TINY, 1.1e6),
     (Channel, "loss_probability"): (*NO_NUMBERS, -0.01, 1.01, INF),
     (Channel, "delay_s"): (*NO_NUMBERS, -0.01, 3601.0, INF),
@@ -113,8 +112,7 @@ REFUSED = {
     (Channel, "repeats"): (*COUNT, 0, 1001),
     (Channel, "reach"): KIND,
     (Channel, "signal"): (None, Reward(), "strong"),
-    (Channel, "silent_after_s"): (*POSITIVE, TINY, 0.9e-3, 1.1e9),
-    (Ending, "sigma_end"): (*POSITIVE, INF, 0.9e-4, 1.1e4),
+    (Ending, "sigma_end"): (*POSITIVE, INF, 0.9e-4, 30.0),
     (Ending, "termination"): KIND,
     (Ending, "seen_share"): ("1", True, [1.0], NAN, 0.0, -0.5, 1.0001, INF),
     (Ending, "unseen_free_voxels"): ("1", True, [1], NAN, -1, 1.5, 2**31),
@@ -155,7 +153,6 @@ REFUSED = {
     (Scenario, "grid"): (None, (7, 11, 5)),
     (Scenario, "world"): (None, 1),
     (Scenario, "robots"): (*COUNT, 0, 1001),
-    (Scenario, "sigma_prior"): (*POSITIVE, INF, 0.9e-3, 1.1e4),
     (Scenario, "decision_period_s"): ("1", True, [1.0], NAN, 0.0, -1.0, TINY, 0.9e-3, 1.1e5, HUGE, INF),
     (Scenario, "track_truth"): SWITCH,
     (Scenario, "robot"): (None, Reward(), "free"),
@@ -268,7 +265,6 @@ def test_settings_that_do_not_fit_each_other_are_refused():
     discrete = {"action": {"kind": "discrete"}}
     for settings, field in (
         ({"ending": {"sigma_end": 30.0}}, "Ending.sigma_end"),
-        ({"sigma_prior": 0.01}, "Ending.sigma_end"),
         ({**discrete, "robot": {"reach_m": INF}}, "Action.kind"),
         ({**discrete, "observation": {"overlaps": True}}, "Observation.overlaps"),
         ({"observation": {"overlaps": True}}, "Observation.overlaps"),

@@ -29,8 +29,6 @@ RATES = {
     "xy_per_m": 0.01,
     "z_per_m": 0.003,
     "yaw_per_m": 0.0025,
-    "xy_per_rad": 0.002,
-    "z_per_rad": 0.001,
     "yaw_per_rad": 0.004,
 }
 FULL_VIEW = {"half_yaw_rad": math.pi, "half_pitch_rad": math.pi}

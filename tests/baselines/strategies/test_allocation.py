@@ -25,9 +25,7 @@ from tests.reference.scenes import build, build_known, free_box, put, started
 
 def corridor(places, heard=True):
     """Robots in a corridor along y of which the middle is known: unexplored at both ends."""
-    missions = started(
-        free_box(robots=len(places), robot={"reach_m": 50.0, "body_radius_m": 0.0}, sigma_prior=30.0)
-    )
+    missions = started(free_box(robots=len(places), robot={"reach_m": 50.0, "body_radius_m": 0.0}))
     solid = np.ones(missions.grid.shape, bool)
     solid[3, :, 2] = False
     build_known(missions, solid, [(3, y, 2) for y in places])

@@ -47,13 +47,16 @@ def times_of(seconds, limit_s=90.0):
 
 def test_the_tasks_are_paired_and_say_what_fails():
     scenarios = {task.name: task.scenario for task in find_suite("faults").tasks}
-    assert len(scenarios) == len(faults.TEAMS) * len(faults.CHANNELS)
+    assert len(scenarios) == len(faults.TEAMS) * (len(faults.CHANNELS) + len(faults.FAULTS))
     whole = scenarios["room, 4 robots"]
     assert whole.robots == 4 and whole.ending.time_limit_s == 1000.0 and not whole.faults.happen
     alone = scenarios["room, 4 robots, isolated"]
     assert alone.channel.burst == 0 and not alone.channel.announcements
     assert scenarios["office, 4 robots, 90% of messages lost"].channel.loss_probability == 0.9
     assert scenarios["room, 2 robots, line of sight"].channel.reach == "line_of_sight"
+    sensors, radios = (scenarios[f"room, 4 robots, {name} fail"].faults for name in ("sensors", "radios"))
+    assert sensors.sensor.happens and sensors.blind.happens and not sensors.radio.happens
+    assert radios.radio.happens and radios.silent.happens and not radios.sensor.happens
     assert set(STRATEGIES) <= set(ALL_STRATEGIES)
 
 

@@ -35,7 +35,8 @@ NAMES = {
             "4 robots, half of the messages lost",
             "4 robots, in line of sight",
         )
-    ],
+    ]
+    + ["office-signal, 4 robots"],
     "others": [
         "box-7x11x5, 2 robots",
         "lab, 2 robots",

@@ -30,6 +30,7 @@ FREE_SHARE = {
     "box-7x11x5": (1.0, 1.0),
     "room-furnished": (0.9, 0.99),
     "office": (0.94, 0.98),
+    "office-signal": (0.94, 0.98),
     "office-3d": (0.84, 0.92),
     "office-mixed": (0.7, 0.92),
     "corridor": (0.2, 0.55),

@@ -71,7 +71,7 @@ def test_where_a_body_does_not_fit_by_hand():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_missions_in_a_box_end(name):
-    figures = figures_of(name, sigma_prior=30.0, time_limit_s=600.0)
+    figures = figures_of(name, time_limit_s=600.0)
     assert figures["finished"], figures["end_reason"]
 
 
