@@ -22,7 +22,7 @@ from benchmarks.proofs.drawn_scenarios import Drawn, draw_scenario
 from entropy_explore_env.errors import EntropyExploreError
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.reports.state_digest import state_digest
 
 STEPS = 40
 _PROCESSORS = ("", "generic", "haswell")

@@ -25,7 +25,7 @@ from entropy_explore_env.reports.mission_record import (
     reset_options_of,
     save_record,
 )
-from entropy_explore_env.reports.record_versions import named_digest
+from entropy_explore_env.reports.state_digest import named_digest
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import BOX
 

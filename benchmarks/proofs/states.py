@@ -10,7 +10,7 @@ from benchmarks.proofs.cases import BrokenPromiseError, Found
 from entropy_explore_env.errors import EntropyExploreError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
-from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import BOX

@@ -1,36 +1,26 @@
 """A mission as a file from which it can be run again, bit for bit: settings, seed, every command, a digest.
 
-An `.npz` without pickled objects. Its entries are `format` ("entropy_explore_env mission"), `version` (3),
-`library` (its version), `settings` (JSON, `settings_json`), `seed` (decimal digits), `episode`, `strategy`,
-`reward_function` (a name, or empty), `commands` ((T, A, N) floating-point or (T, A) whole numbers, exactly as
-given), `scan_s` and `scan_robot` (S,), `digest` and `world_digest` (SHA-256), and `checksum` (SHA-256 of all
-other entries). Only where they were given: `world`, an object, as the bytes that `save_world` writes;
-`world_number`; `starts`, (A, 5). Files of earlier versions are read, too: see reports/record_versions.py.
+An `.npz` without pickled objects. Its entry `head` is JSON in UTF-8, of the form of `Head`; beside it lie
+`commands` ((T, A, N) floating-point or (T, A) whole numbers, exactly as given), `scan_s` and `scan_robot`
+(S,), `checksum` (SHA-256 of all other entries) and, only where they were given, `starts` (A, 5) and `world`,
+the bytes that `save_world` writes. Files of any other version are refused.
 """
 
 from __future__ import annotations
 
 import io
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import numpy as np
 
 from entropy_explore_env.errors import CallOrderError, EntropyExploreError, RecordError, WorldError
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.reports.record_versions import (
-    FORMAT_VERSION,
-    LAST_NAMED_DIGEST,
-    OPTIONAL,
-    REQUIRED,
-    digest_of_version,
-    named_digest,
-)
-from entropy_explore_env.reports.state_values import state_digest
-from entropy_explore_env.settings.json import scenario_from_json, settings_json
+from entropy_explore_env.reports.state_digest import named_digest, state_digest
+from entropy_explore_env.settings.json import scenario_of, settings_of
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.validation import checked_path
 from entropy_explore_env.version import VERSION
@@ -43,10 +33,32 @@ from entropy_explore_env.worlds.world import World
 from entropy_explore_env.writing import write_atomically
 
 FORMAT = "entropy_explore_env mission"
+FORMAT_VERSION = 4
 MAX_FILE_BYTES = 1 << 30
-_LONGEST_TEXT = 1 << 20
-_TEXTS = ("format", "library", "settings", "seed", "strategy", "digest", "world_digest", "checksum")
-_NUMBERS = ("version", "episode", "commands", "scan_s", "scan_robot")
+_ENTRIES = {"head", "commands", "scan_s", "scan_robot", "starts", "world", "checksum"}
+_Text = Annotated[str, msgspec.Meta(max_length=1 << 20)]
+_Digest = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
+
+
+class Form(msgspec.Struct, kw_only=True):
+    """What a file says of itself, whatever its version."""
+
+    format: str
+    version: int
+
+
+class Head(Form, kw_only=True, forbid_unknown_fields=True):
+    """What a record says in words and numbers; see MissionRecord."""
+
+    library: _Text
+    settings: dict[str, Any]
+    seed: Annotated[str, msgspec.Meta(pattern="^[0-9]{1,4000}$")]
+    episode: Annotated[int, msgspec.Meta(ge=0, lt=1_000_000)]
+    strategy: _Text
+    reward_function: _Text
+    digest: _Digest
+    world_digest: _Digest
+    world_number: Annotated[int, msgspec.Meta(ge=0)] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +73,7 @@ class MissionRecord:
             where robots' actions differ in length, N is the longest and zeros fill the others up.
         scan_s: (S,) float64, when scans ended, in the order in which they were noted.
         scan_robot: (S,) int64, whose they were.
-        digest: Of the state at the end: see `digest_of_version`.
+        digest: Of the state at the end: see `state_digest`.
         world_digest: Of the true world: see `world_digest`.
         strategy: What chose the commands; for people.
         library: Version of the library that ran the mission.
@@ -70,7 +82,6 @@ class MissionRecord:
         starts: (A, 5) float64 poses that the reset was given; None = drawn.
         reward_function: Qualified name of the function that rewarded the robots; empty = the scenario's
             reward did. It has no part in the state: a replay does not need it.
-        version: Of the format, which says how the digest is made.
 
     Records compare and hash by identity: two of them are equal only if they are the same object.
     """
@@ -89,7 +100,6 @@ class MissionRecord:
     world_number: int | None = None
     starts: np.ndarray | None = None
     reward_function: str = ""
-    version: int = FORMAT_VERSION
 
 
 class CommandRecorder:
@@ -172,7 +182,7 @@ def reset_options_of(record: MissionRecord) -> dict[str, Any]:
 
 def same_end(record: MissionRecord, missions: Missions) -> bool:
     """Whether the first of some missions is, bit for bit, where the record's mission ended."""
-    return digest_of_version(missions, 0, record.version) == record.digest
+    return state_digest(missions, 0) == record.digest
 
 
 def world_digest(missions: Missions, mission: int) -> str:
@@ -209,28 +219,29 @@ def save_record(record: MissionRecord, path: Path | str) -> None:
         OSError: The file cannot be written.
     """
     path = checked_path("record", path)
+    if record.world is not None and record.world.grid.voxels > MAX_FILE_VOXELS:
+        raise RecordError("world", record.world, f"one of at most {MAX_FILE_VOXELS} voxels in a record")
+    head = Head(
+        format=FORMAT,
+        version=FORMAT_VERSION,
+        library=record.library,
+        settings=settings_of(record.scenario),
+        seed=str(record.seed),
+        episode=record.episode,
+        strategy=record.strategy,
+        reward_function=record.reward_function,
+        digest=record.digest,
+        world_digest=record.world_digest,
+        world_number=record.world_number,
+    )
     entries = {
-        "format": np.asarray(FORMAT),
-        "version": np.int64(record.version),
-        "library": np.asarray(record.library),
-        "settings": np.asarray(settings_json(record.scenario)),
-        "seed": np.asarray(str(record.seed)),
-        "episode": np.int64(record.episode),
-        "strategy": np.asarray(record.strategy),
+        "head": np.frombuffer(msgspec.json.encode(head), np.uint8),
         "commands": record.commands,
         "scan_s": record.scan_s,
         "scan_robot": record.scan_robot,
-        "digest": np.asarray(record.digest),
-        "world_digest": np.asarray(record.world_digest),
     }
-    if record.version > LAST_NAMED_DIGEST:
-        entries["reward_function"] = np.asarray(record.reward_function)
     if record.world is not None:
-        if record.world.grid.voxels > MAX_FILE_VOXELS:
-            raise RecordError("world", record.world, f"one of at most {MAX_FILE_VOXELS} voxels in a record")
         entries["world"] = np.frombuffer(world_bytes(record.world), np.uint8)
-    if record.world_number is not None:
-        entries["world_number"] = np.int64(record.world_number)
     if record.starts is not None:
         entries["starts"] = record.starts
     buffer = io.BytesIO()
@@ -254,7 +265,8 @@ def load_record(path: Path | str) -> MissionRecord:
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
             raise RefusedError(f"a file of at most {MAX_FILE_BYTES >> 30} GiB")
-        return _record(_checked(arrays(path.read_bytes())))
+        entries = arrays(path.read_bytes())
+        return _record(_head(entries), entries)
     except RefusedError as error:
         raise RecordError("mission record", str(path), str(error)) from None
     except OSError as error:
@@ -263,67 +275,63 @@ def load_record(path: Path | str) -> MissionRecord:
         ) from None
     except EntropyExploreError as error:
         raise RecordError("mission record", str(path), f"one whose settings are allowed ({error})") from None
+    except msgspec.ValidationError as error:
+        allowed = f"one whose head has the right form ({error})"
+        raise RecordError("mission record", str(path), allowed) from None
     except Exception:  # of a broken archive: zipfile and NumPy raise a dozen kinds
         raise RecordError("mission record", str(path), "a whole .npz that --record wrote") from None
 
 
-def _checked(entries: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """The entries, all there, of this format, as they were written."""
-    if str(entries.get("format")) != FORMAT:
+def _head(entries: Mapping[str, np.ndarray]) -> Head:
+    """The head of a record of this format, as it was written."""
+    if "head" not in entries and str(entries.get("format")) != FORMAT:
         raise RefusedError("a mission record, as --record writes it")
-    version = int(entries["version"])
-    if version not in REQUIRED:
-        raise RefusedError(f"a mission record of format version {', '.join(map(str, REQUIRED))}")
-    needed = {*_TEXTS, *_NUMBERS, *REQUIRED[version]}
-    there = set(entries)
-    if not needed <= there <= needed.union(OPTIONAL[version]) or _checksum(entries) != str(
-        entries["checksum"]
-    ):
+    text = entries["head"].tobytes() if "head" in entries else b'{"format": "", "version": 0}'
+    form = msgspec.json.decode(text, type=Form)
+    if (form.format, form.version) != (FORMAT, FORMAT_VERSION):
+        raise RefusedError(f"a mission record of format version {FORMAT_VERSION}: this one has another form")
+    if not entries.keys() <= _ENTRIES or _checksum(entries) != str(entries["checksum"]):
         raise RefusedError("a mission record as it was written: this one was changed or damaged")
-    return entries
+    return msgspec.json.decode(text, type=Head)
 
 
-def _record(entries: dict[str, np.ndarray]) -> MissionRecord:
+def _record(head: Head, entries: Mapping[str, np.ndarray]) -> MissionRecord:
     """The record, if its entries fit each other."""
-    texts = {name: str(entries[name]) for name in _TEXTS}
-    scenario = scenario_from_json(texts["settings"])
-    commands, scan_s, scan_robot = (entries[name] for name in ("commands", "scan_s", "scan_robot"))
-    scans, team, version = len(scan_s), scenario.robots, int(entries["version"])
-    kinds = {2: "i", 3: "f"}
-    digests = (texts["digest"], texts["world_digest"])
-    world = world_from_bytes(entries["world"].tobytes()) if "world" in entries else None
-    reward_function = str(entries.get("reward_function", ""))
-    number, starts = entries.get("world_number"), entries.get("starts")
-    if (
-        commands.dtype.kind != kinds.get(commands.ndim)
-        or commands.shape[1] != team
-        or (scan_s.dtype, scan_s.shape) != (np.float64, (scans,))
-        or (scan_robot.dtype, scan_robot.shape) != (np.int64, (scans,))
-        or not all(re.fullmatch("[0-9a-f]{64}", digest) for digest in digests)
-        or not re.fullmatch("[0-9]{1,4000}", texts["seed"])
-        or max(len(texts["strategy"]), len(reward_function)) > _LONGEST_TEXT
-        or not 0 <= int(entries["episode"]) < 1_000_000
-        or (scenario.world == GIVEN and world is None)
-        or (scenario.world != GIVEN and world is not None and version <= LAST_NAMED_DIGEST)
-        or (world is not None and world.grid != scenario.grid)
-        or (number is not None and (number.shape != () or number.dtype != np.int64 or number < 0))
-        or (number is not None and world is not None)
-        or (starts is not None and (starts.shape != (team, 5) or starts.dtype != np.float64))
+    scenario = scenario_of(head.settings)
+    commands, scans = entries["commands"], len(entries["scan_s"])
+    steps, longest = len(commands), commands.shape[-1]
+    shapes = {"i": (steps, scenario.robots), "f": (steps, scenario.robots, longest)}
+    _require(commands.shape == shapes.get(commands.dtype.kind), "commands")
+    for name, kind, shape in (
+        ("scan_s", np.float64, (scans,)),
+        ("scan_robot", np.int64, (scans,)),
+        ("starts", np.float64, (scenario.robots, 5)),
     ):
-        raise RefusedError("a mission record whose entries fit each other")
+        array = entries.get(name)
+        there = array is not None or name == "starts"
+        _require(there and (array is None or (array.dtype == kind and array.shape == shape)), name)
+    world = world_from_bytes(entries["world"].tobytes()) if "world" in entries else None
+    _require(world is not None or scenario.world != GIVEN, "world")
+    _require(world is None or (world.grid == scenario.grid and head.world_number is None), "world")
     return MissionRecord(
         scenario,
-        int(texts["seed"]),
-        int(entries["episode"]),
+        int(head.seed),
+        head.episode,
         commands,
-        scan_s,
-        scan_robot,
-        *digests,
-        strategy=texts["strategy"],
-        library=texts["library"],
+        entries["scan_s"],
+        entries["scan_robot"],
+        head.digest,
+        head.world_digest,
+        strategy=head.strategy,
+        library=head.library,
         world=world,
-        world_number=None if number is None else int(number),
-        starts=starts,
-        reward_function=reward_function,
-        version=version,
+        world_number=head.world_number,
+        starts=entries.get("starts"),
+        reward_function=head.reward_function,
     )
+
+
+def _require(fits: bool, name: str) -> None:
+    """Refuse a record one entry of which does not fit the others."""
+    if not fits:
+        raise RefusedError(f"a mission record whose entries fit each other: {name} does not")

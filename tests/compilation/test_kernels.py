@@ -207,7 +207,7 @@ def test_without_numba_kernels_are_functions(tmp_path):
 INTERPRETED = """
 import numpy as np
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import BOX
 

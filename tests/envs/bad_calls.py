@@ -32,7 +32,7 @@ from entropy_explore_env import (
 )
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.sensor import RangeSensor

@@ -16,7 +16,7 @@ import pytest
 from entropy_explore_env.envs.conformance import check_conformance
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
-from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import BOX
 from entropy_explore_env.worlds.load import save_world

@@ -24,8 +24,7 @@ from entropy_explore_env.reports.mission_record import (
     load_record,
     save_record,
 )
-from entropy_explore_env.reports.record_versions import named_digest
-from entropy_explore_env.reports.state_values import state_values
+from entropy_explore_env.reports.state_digest import named_digest, state_values
 
 RECORDS = Path(__file__).parent / "records"
 NAMES = sorted(path.stem for path in RECORDS.glob("*.npz") if not path.stem.endswith(".summary"))

@@ -19,7 +19,7 @@ from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.state import FAULT, MissionEnd
 from entropy_explore_env.randomness import Stream, draw_uniform
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.robots.motion import MoveEnd
 from tests.missions.replays import check_replay
 from tests.missions.test_tick import toward

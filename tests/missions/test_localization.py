@@ -21,7 +21,7 @@ from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.robots.channel import BITS_PER_BATCH, BITS_PER_COVARIANCE, BITS_PER_MEASUREMENT
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.fiducials import Fiducials

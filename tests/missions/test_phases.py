@@ -7,7 +7,7 @@ import pytest
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.channel import Channel
 from tests.reference.scenes import free_box, started, wander

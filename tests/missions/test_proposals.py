@@ -16,7 +16,7 @@ from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.planner.candidate_features import COLUMNS, CONTEXT, FEATURES
 from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.randomness import Stream, splitmix_states
-from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.settings.action import Action
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid

@@ -15,7 +15,7 @@ from entropy_explore_env.missions.redecision import CHOICE, braking_metres, keep
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.view import view_of
-from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.robots.motion import MoveEnd
 from tests.missions.test_driving import (
     ALL_ROUND,

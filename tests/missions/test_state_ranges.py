@@ -14,7 +14,7 @@ from entropy_explore_env.errors import EntropyExploreError, RecordError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.state_ranges import FROM_WORLD, check_ranges
-from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.reports.state_digest import state_digest
 from tests.reference.scenes import free_box, started, wander
 
 DELAYED = {"delay_s": 3.0, "i_min_bits": 0.0}

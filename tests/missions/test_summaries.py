@@ -14,7 +14,7 @@ from entropy_explore_env.belief.pooling import Pool, fresh_sums, pool_belief
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.summaries import precision_of_place
-from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.robots.localization import pack_covariance
 from entropy_explore_env.robots.map_summary import decode_map, encode_map, is_summary
 from entropy_explore_env.settings.changes import with_settings

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import io
+import json
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,15 +25,7 @@ from entropy_explore_env.reports.mission_record import (
     save_record,
     world_digest,
 )
-from entropy_explore_env.reports.record_versions import digest_of_version, named_digest
-from entropy_explore_env.reports.state_values import (
-    FIELDS_SEEN,
-    FIELDS_UNDER_WAY,
-    FOLLOWS_FROM_WORLD,
-    state_digest,
-    state_values,
-    value_bytes,
-)
+from entropy_explore_env.reports.state_digest import FOLLOWS_FROM_WORLD, named_digest, state_digest
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.worlds.load import save_world, world_bytes
@@ -175,15 +167,7 @@ def test_a_digest_sees_every_array_and_field(changes):
     missions = started(free_box(**changes), seed=3, missions=2)
     before, other = state_digest(missions, 0), state_digest(missions, 1)
     assert before != other
-    left_out = [state_values(missions, 0)[name] for name in FOLLOWS_FROM_WORLD]
-    if not missions.scenario.channel.phase_s:  # nobody uses them then: tests/missions/test_phases.py
-        left_out.append(missions.state.phases)
-    clocks = missions.state.missions
-    left_out += [clocks[name] for name in ("visible", "visible_free", "explored_end", "explored_free_end")]
-    if not missions.scenario.ending.by_seen:
-        left_out += [clocks[name] for name in FIELDS_SEEN]
-    if missions.scenario.robot.redecide == "at_stop":
-        left_out += [missions.state.robots[name] for name in FIELDS_UNDER_WAY]
+    left_out = [getattr(missions.state, name) for name in FOLLOWS_FROM_WORLD]
     seen = 0
     for array in leaf_arrays(missions.state):
         skipped = any(np.shares_memory(array, part) for part in left_out)
@@ -199,60 +183,11 @@ def test_a_digest_sees_every_array_and_field(changes):
     assert seen > 50
 
 
-def test_a_digest_covers_values_and_neither_names_nor_shapes_nor_widths(monkeypatch):
-    missions = started(free_box(**DELAYED), seed=3)
-    values, before = state_values(missions, 0), state_digest(missions, 0)
-    others = {f"{name} today": value for name, value in values.items() if name not in FOLLOWS_FROM_WORLD}
-    others = {
-        name: value.reshape(-1).astype(np.int16 if value.dtype == np.int8 else value.dtype)
-        for name, value in others.items()
-    }
-    monkeypatch.setattr("entropy_explore_env.reports.state_values.state_values", lambda *_: others)
-    assert state_digest(missions, 0) == before
-    swapped = dict(reversed(others.items()))
-    monkeypatch.setattr("entropy_explore_env.reports.state_values.state_values", lambda *_: swapped)
-    assert state_digest(missions, 0) != before
-
-
-def test_a_digest_by_hand():
-    assert value_bytes(np.array([1, -2], np.int8)) == b"i 2\n" + np.array([1, -2], "<i8").tobytes()
-    assert value_bytes(np.array(True)) == b"b 1\n\x01"
-    assert value_bytes(np.array([[0.5]], np.float32)) == b"f4 1\n" + np.array([0.5], "<f4").tobytes()
-    assert value_bytes(np.array([3], np.uint64)) == b"u 1\n" + np.array([3], "<u8").tobytes()
-    text = b"a <f8 (2,)\n" + np.array([1.0, 2.0]).tobytes() + b"b |b1 ()\n\x01"
-    parts = {"a": np.array([1.0, 2.0]), "b": np.array(True)}
-    assert named_digest(parts) == hashlib.sha256(text).hexdigest()
-
-
-FIRST_DIGESTS = {
-    "delayed": "e1bd4f38fd78b4690b65f2416c90ca1a4795a337a68c067bc76bc5baacee19cb",
-    "phased": "43bbafe1e9ef4986b5e5e461cdd7e8aec6813eb05331862092d38d76dcfd31e0",
-}
-"""Of the states below, by the code that wrote format version 1."""
-
-
-@pytest.mark.parametrize(("name", "changes"), [("delayed", DELAYED), ("phased", PHASED)])
-def test_the_digest_of_earlier_versions_is_what_it_was(name, changes):
-    """Names, types and shapes included; the state is filled with numbers that no arithmetic made."""
-    missions = started(free_box(**changes), seed=3)
-    for number, value in enumerate(state_values(missions, 0).values()):
-        value[...] = (np.arange(value.size).reshape(value.shape) + number) % 2
-    for version in (1, 2):
-        assert digest_of_version(missions, 0, version) == FIRST_DIGESTS[name]
-    assert digest_of_version(missions, 0, 3) == state_digest(missions, 0) != FIRST_DIGESTS[name]
-
-
-def test_records_of_earlier_versions_load_are_verified_and_are_written_as_they_were(file, tmp_path):
+def test_a_record_knows_the_state_at_its_end():
     record, missions = recorded()
-    first = {name: value for name, value in entries_of(file).items() if name != "reward_function"}
-    digest = digest_of_version(missions, 0, 1)
-    old = repacked({**first, "version": np.int64(1), "digest": np.asarray(digest)})
-    back = load_record_bytes(old, tmp_path)
-    assert (back.version, back.digest, back.reward_function) == (1, digest, "")
-    assert same_end(back, missions) and same_end(record, missions)
-    assert not same_end(dataclasses.replace(back, version=3), missions)
-    assert saved(back, tmp_path).read_bytes() == old
-    refused(repacked({**first, "version": np.int64(2)}), tmp_path, "changed or damaged")
+    assert same_end(record, missions)
+    missions.state.robots["distance_m"][0, 0] += 1e-9
+    assert not same_end(record, missions)
 
 
 def test_another_world_in_the_file_is_refused(tmp_path):
@@ -303,8 +238,8 @@ def test_a_record_holds_the_world_that_was_given(tmp_path):
 
 
 def test_records_without_such_a_world_have_no_entry_for_it(file, tmp_path):
-    assert int(entries_of(file)["version"]) == 3
-    assert not {"world", "world_number", "starts"} & entries_of(file).keys()
+    assert not {"world", "starts"} & entries_of(file).keys()
+    assert head_of(file)["world_number"] is None
     assert load_record_bytes(file, tmp_path).world is None
 
 
@@ -327,7 +262,7 @@ def other_world() -> np.ndarray:
         ("world", np.zeros(9, np.uint8), "a whole .npz"),
         ("world", np.zeros(0, np.uint8), "a whole .npz"),
         ("world", other_world(), "fit each other"),
-        ("world_number", np.int64(3), "fit each other"),
+        ("world_number", 3, "fit each other: world does not"),
     ],
 )
 def test_forged_worlds_are_refused(name, value, said, tmp_path):
@@ -382,61 +317,70 @@ def test_a_flipped_bit_is_refused_or_changes_nothing(place, bit, file, tmp_path_
     except RecordError:
         return
     original = entries_of(file)
-    assert record.digest == str(original["digest"])
+    assert record.digest == head_of(file)["digest"]
     np.testing.assert_array_equal(record.commands, original["commands"])
 
 
-@pytest.mark.parametrize(
-    "name", ["library", "settings", "seed", "episode", "strategy", "commands", "scan_s", "digest"]
-)
+@pytest.mark.parametrize("name", ["head", "commands", "scan_s"])
 def test_what_was_changed_by_hand_is_refused(name, file, tmp_path):
     entries = entries_of(file)
-    value = entries[name]
-    entries[name] = np.asarray(str(value) + "0") if value.dtype.kind == "U" else value + 1
-    refused(packed(entries), tmp_path, "changed or damaged")
+    changed = file_head(file, strategy="other") if name == "head" else entries[name] + 1
+    refused(packed({**entries, name: changed}), tmp_path, "changed or damaged")
+
+
+def head_of(file: bytes) -> dict:
+    return json.loads(entries_of(file)["head"].tobytes())
+
+
+def file_head(file: bytes, **changes: object) -> np.ndarray:
+    """The head with other values."""
+    return np.frombuffer(json.dumps({**head_of(file), **changes}).encode(), np.uint8)
 
 
 def forged(file: bytes, **changes: object) -> bytes:
-    """The record with other entries, its checksum made to fit."""
-    entries = {**entries_of(file), **{name: np.asarray(value) for name, value in changes.items()}}
-    return repacked({name: value for name, value in entries.items() if value.dtype != object or value.shape})
-
-
-def repacked(entries: dict) -> bytes:
-    """Entries as a record's bytes, with the checksum that they need."""
-    from entropy_explore_env.reports import mission_record
-
+    """The record with other entries, or values of its head, its checksum made to fit."""
+    arrays = {name: value for name, value in changes.items() if isinstance(value, np.ndarray)}
+    head = {name: value for name, value in changes.items() if name not in arrays}
+    entries = {**entries_of(file), **({"head": file_head(file, **head)} if head else {}), **arrays}
     del entries["checksum"]
-    return packed({**entries, "checksum": np.asarray(mission_record._checksum(entries))})
+    return packed({**entries, "checksum": np.asarray(named_digest(dict(sorted(entries.items()))))})
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"version": np.int64(4)}, "format version 1, 2, 3"),
-        ({"version": np.int64(1)}, "changed or damaged"),
-        ({"version": np.int64(2)}, "changed or damaged"),
-        ({"format": "another"}, "as --record writes it"),
-        ({"commands": np.zeros((3, 7, 5), np.float32)}, "fit each other"),
-        ({"commands": np.zeros((3, 2), np.float32)}, "fit each other"),
-        ({"commands": np.zeros(3)}, "fit each other"),
-        ({"scan_robot": np.zeros(2, np.int64)}, "fit each other"),
-        ({"digest": "z" * 64}, "fit each other"),
-        ({"seed": "-1"}, "fit each other"),
-        ({"episode": np.int64(-1)}, "fit each other"),
-        ({"settings": "{}"}, "settings are allowed"),
-        ({"settings": "["}, "settings are allowed"),
+        ({"version": 3}, "of format version 4"),
+        ({"version": 5}, "of format version 4"),
+        ({"format": "another"}, "of format version 4"),
+        ({"commands": np.zeros((3, 7, 5), np.float32)}, "fit each other: commands"),
+        ({"commands": np.zeros((3, 2), np.float32)}, "fit each other: commands"),
+        ({"commands": np.zeros(3)}, "fit each other: commands"),
+        ({"scan_robot": np.zeros(2, np.int64)}, "fit each other: scan_robot"),
+        ({"scan_s": np.zeros((2, 2))}, "fit each other: scan_s"),
+        ({"digest": "z" * 64}, r"matching regex.*digest"),
+        ({"seed": "-1"}, r"matching regex.*seed"),
+        ({"episode": -1}, r"`int` >= 0.*episode"),
+        ({"episode": "1"}, r"`int`.*episode"),
+        ({"settings": {}}, "settings are allowed"),
+        ({"settings": "["}, r"`object`.*settings"),
+        ({"more": 1}, "unknown field `more`"),
         ({"more": np.zeros(3)}, "changed or damaged"),
-        ({"world_number": np.int64(-1)}, "fit each other"),
-        ({"world_number": np.float64(1.0)}, "fit each other"),
-        ({"starts": np.zeros((2, 3))}, "fit each other"),
-        ({"starts": np.zeros((2, 5), np.float32)}, "fit each other"),
-        ({"reward_function": "x" * 2_000_000}, "fit each other"),
+        ({"head": np.zeros(3)}, "a whole .npz"),
+        ({"world_number": -1}, r"`int` >= 0.*world_number"),
+        ({"world_number": 1.5}, r"`int \| null`.*world_number"),
+        ({"starts": np.zeros((2, 3))}, "fit each other: starts"),
+        ({"starts": np.zeros((2, 5), np.float32)}, "fit each other: starts"),
+        ({"reward_function": "x" * 2_000_000}, r"length.*reward_function"),
     ],
 )
 def test_forged_records_are_refused(changes, said, file, tmp_path):
     assert load_record_bytes(forged(file), tmp_path).strategy == "chance"
     refused(forged(file, **changes), tmp_path, said)
+
+
+def test_records_of_earlier_versions_are_refused_by_name(tmp_path):
+    earlier = {"format": np.asarray("entropy_explore_env mission"), "version": np.int64(3)}
+    refused(packed(earlier), tmp_path, "format version 4: this one has another form")
 
 
 def load_record_bytes(data: bytes, folder: Path) -> MissionRecord:

@@ -136,7 +136,7 @@ def test_a_mission_that_breaks_is_counted_and_left_out_of_times():
     assert np.isnan(times.of(*TEAM, "voronoi", "range 3 m")).tolist() == [False, True]
     cell[0]["joint"] = {"error": [0.5, math.nan]}
     claim = all_claims(times)[0]
-    assert (claim.ours, claim.holds) == (2.0, False) and claim.claim.startswith("missions of 20 ")
+    assert (claim.ours, claim.holds) == (2.0, False) and claim.claim.startswith("missions of 24 ")
     found = times.ratio(*TEAM, "voronoi", "range 3 m", NOTHING_FAILS)
     assert found is not None and found.value == pytest.approx(1.0)
 
@@ -148,7 +148,7 @@ def test_the_command_writes_a_page_and_makes_it_again_of_its_archive(tmp_path, c
     page, picture = tmp_path / "faults.md", tmp_path / "faults" / "faults.png"
     before = page.read_text(), picture.read_bytes()
     assert "office" not in before[0].split("## Claims")[1]  # which was not run
-    assert "40 missions, 2 a point" in before[0] and "| `gradient` | room, 4 |" in before[0]
+    assert "48 missions, 2 a point" in before[0] and "| `gradient` | room, 4 |" in before[0]
     printed = json.loads(capsys.readouterr().out)
     assert len(printed["tasks"]) == 2 * len(CONDITIONS) and printed["failed"] == []
     page.unlink()
