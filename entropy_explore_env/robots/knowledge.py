@@ -45,7 +45,7 @@ class TeammateView:
 
     Equal only to itself, as other views.
 
-    A teammate that has not been heard for long (`Channel.silent_after_s`) counts as silent: it is out of
+    A teammate that has not been heard for long (`missions.silence.is_silent`) counts as silent: it is out of
     reach, or works no more. Where it was last heard it may still stand; what it announced is not kept, so
     that its place is free for others.
 
