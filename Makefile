@@ -9,7 +9,7 @@ STAMP := $(VENV)/installed-
 VENV_RLLIB := .venv-rllib
 VENV_BENCHMARL := .venv-benchmarl
 STYLE := $(RUN) ruff check . && $(RUN) ruff format --check . && $(VENV)/bin/lint-imports --no-cache
-WARM := $(RUN) entropy_explore_env.warm --processes 1
+WARM := $(RUN) entropy_explore_env warm --processes 1
 
 .PHONY: help demo new-user docs docs-links test test-long boundscheck test-rllib test-benchmarl lint bench policy \
 	reliability night reproduce clean

@@ -1,10 +1,12 @@
-"""Strategies compared: `python -m baselines.benchmark --suite plans`, `--world map.yaml`, `--scenarios room`.
+"""Compare strategies, in a suite of pinned worlds and starts or in tasks of your own.
 
-A suite is a set of worlds, starts and seeds that is pinned: a file of data in baselines/suites. Every
-strategy runs the same missions; mission k of all tasks and strategies is run before any mission k + 1.
-Written are a page with a table over all tasks, a figure, and an archive of all missions, with which another
-run begins. An interrupted run goes on where it was. A mission that raises an error or runs past its limit is
-a row with the reason.
+    python -m baselines.benchmark --suite plans --strategies best,mine.py:Mine
+    python -m baselines.benchmark --scenarios room,office --robots 1,3 --seeds 10
+    python -m baselines.benchmark --world maps/*.yaml --quick --out results/mine
+
+Every strategy runs the same missions; mission k of all tasks and strategies comes before any mission k + 1.
+The folder gets a page with a table over all tasks, a figure, and an archive of all missions. An interrupted
+run continues where it was. A mission that raises an error or exceeds its limit is a row with the reason.
 """
 
 from __future__ import annotations
@@ -16,9 +18,10 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
-from baselines.cli.arguments import INLINE, make_folder, parse, print_json, run_command, told_command
+from baselines.cli.arguments import make_folder, parse, print_json, run_command, told_command
+from baselines.cli.options import Mark
 from baselines.cli.task_options import TaskOptions, given_in, is_of_task, is_whole_scenario
 from baselines.cli.worker_options import TrialOptions
 from baselines.experiments.rows import read_table
@@ -50,33 +53,37 @@ _NOT_TOLD = (*_WHERE, "--rerun", "--since")
 class Args(TrialOptions):
     """Compare strategies."""
 
+    usual: ClassVar = (
+        *("suite", "scenarios", "world", "strategies", "robots", "seeds", "quick", "settings"),
+        *("time_limit_s", "wall_limit_s", "stop_after_s", "jobs", "out", "tables", "json"),
+    )
+
     suite: str | None = None
-    """plans, volumes, teams, others or faults: worlds and starts that are pinned."""
+    """Pinned worlds and starts: plans, volumes, teams, others or faults."""
     scenarios: str | None = None
-    """In place of a suite: names, commas between, each changed by the options of the task, also by --world;
-    default: room,room-furnished,lab,office,cave, or the scenario that --settings holds as a whole. With
-    --world alone every file, or every file of a folder, is a task of its own."""
+    """Named scenarios, separated by commas, in place of a suite; options of the task change each of them.
+    Default: room,room-furnished,lab,office,cave, or the scenario in --settings. With --world alone every
+    file, or every file of a folder, is a task."""
     strategies: str | None = None
-    """Who runs: names as in baselines.run, commas between, or all; in suites nearest-frontier is added, else
-    random. Default: those that the suite's table compares; without a suite all."""
+    """Names as in baselines.run, separated by commas, or all. A suite adds nearest-frontier, other tasks add
+    random. Default: those in the suite's table; without a suite all."""
     robots: str | None = None
-    """Team sizes of scenarios, commas between; default: 1,2,4, or that of the scenario in --settings."""
+    """Team sizes, separated by commas; default: 1,2,4, or that of the scenario in --settings."""
     seeds: int | None = None
     """Missions of every strategy in every scenario and team size; default: 30."""
     quick: bool = False
-    """A suite of few worlds and starts; without a suite room,office, team sizes 1,2, 5 seeds, where they are
-    not given."""
+    """Fewer worlds and starts of a suite; without one room,office, team sizes 1,2 and 5 seeds by default."""
     world_scenario: str | None = None
     """Scenario that gives robots and sensors for world files; default: office for plans, else room."""
-    task: Annotated[TaskOptions, INLINE] = dataclasses.field(default_factory=TaskOptions)
+    task: Annotated[TaskOptions, Mark.INLINE] = dataclasses.field(default_factory=TaskOptions)
     wall_limit_s: float = 600.0
-    """Time on the clock after which a mission is ended, and counts as failed."""
+    """Wall-clock limit of a mission, which then counts as failed."""
     stop_after_s: float | None = None
-    """Time on the clock after which no mission is begun any more; the same command goes on. 0: none is begun,
-    and the page is made again of what there is."""
+    """Wall-clock time after which no further mission starts; the same command continues. 0: only write the
+    page again."""
     archive: Path | None = None
-    """Missions of an earlier run, NAME.jsonl.xz beside its page: they are not run again. Those in --out are
-    never run again."""
+    """Archive of an earlier run, NAME.jsonl.xz, whose missions are not run again; neither are those in
+    --out."""
     tables: bool = False
     """Print the table of every task, too."""
     out: Path = Path("results/scoreboard")

@@ -1,8 +1,10 @@
-"""A strategy's missions as Parquet, to learn from: `python -m baselines.episodes room --strategy best`.
+"""Write a strategy's missions as Parquet, for offline learning.
 
-The folder gets files of --missions-per-file missions each, of rows that docs/episodes.md describes: what each
-robot observed and chose, and what came of it. The same options give the same bytes, whatever ran them; what
-was stopped goes on where it was.
+    python -m baselines.episodes room --strategy best --missions 1000 --out results/episodes
+
+The folder gets files of --missions-per-file missions each; docs/episodes.md describes their rows: what each
+robot observed and chose, and what came of it. The same options give the same bytes. An interrupted command
+continues where it was.
 """
 
 from __future__ import annotations
@@ -13,9 +15,10 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
-from baselines.cli.arguments import INLINE, Positional, make_folder, parse, print_json, run_command
+from baselines.cli.arguments import make_folder, parse, print_json, run_command
+from baselines.cli.options import Mark
 from baselines.cli.task_options import TaskOptions, base_task, parsed_for, tasked
 from baselines.cli.worker_options import TrialOptions
 from baselines.experiments.rows import read_table
@@ -33,21 +36,26 @@ ROWS = "_rows.jsonl"
 class Args(TrialOptions):
     """Write a strategy's missions as Parquet."""
 
-    scenario: Positional[str] = "room"
+    usual: ClassVar = (
+        *("scenario", "strategy", "robots", "missions", "first_seed", "missions_per_file", "settings"),
+        *("time_limit_s", "world", "voxel_size_m", "jobs", "cluster", "rerun", "out", "json"),
+    )
+
+    scenario: Annotated[str, Mark.POSITIONAL] = "room"
     """A named scenario."""
     strategy: str = "best"
-    """Whose decisions; as in baselines.run."""
+    """Strategy that decides, as in baselines.run."""
     robots: int = 3
     """Team size."""
     missions: int = 100
-    """How many, with the seeds --first-seed, …"""
+    """Number of missions; their seeds count up from --first-seed."""
     first_seed: int = 0
     """Seed of the first mission."""
     missions_per_file: int = 20
-    """A file is written at a time, and whole or not at all."""
-    task: Annotated[TaskOptions, INLINE] = dataclasses.field(default_factory=TaskOptions)
+    """Missions in a file; each file is written whole or not at all."""
+    task: Annotated[TaskOptions, Mark.INLINE] = dataclasses.field(default_factory=TaskOptions)
     observation: Observation = dataclasses.field(default_factory=lambda: Observation(panorama_utility="log2"))
-    """Which parts robots observe; always flat, and only by robots that decide."""
+    """Parts of the observation, which is flat and of robots that decide."""
     out: Path = Path("results/episodes")
     """Folder for the files."""
     json: bool = False

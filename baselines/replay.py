@@ -17,8 +17,9 @@ from typing import Annotated
 
 import numpy as np
 
-from baselines.cli.arguments import ONCE_WORLD, OmitArgPrefixes, Positional, parse, run_command
+from baselines.cli.arguments import parse, run_command
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
+from baselines.cli.options import Also, Mark
 from baselines.cli.progress import progress_bar
 from baselines.cli.task_options import is_of_task
 from entropy_explore_env.command import allow_read_memory
@@ -44,15 +45,15 @@ _OF_A_MISSION = ("robots", "seed", "strategy", "scenario")
 class Args:
     """Run a recorded mission again and compare its end."""
 
-    record: Positional[Path] = Path("mission.npz")
+    record: Annotated[Path, Mark.POSITIONAL] = Path("mission.npz")
     """A mission record, mission.npz."""
-    world_file: Annotated[str | None, ONCE_WORLD] = None
+    world_file: Annotated[str | None, Also("--world")] = None
     """Where the world's file lies now, if it was moved."""
     read_memory_mib: float | None = None
     """MiB of memory that reading a world file may take; default: by the file's size."""
     out: Path | None = None
     """Folder for mission.json, mission.png and mission.gif."""
-    output: OmitArgPrefixes[Outputs] = field(default_factory=Outputs)
+    output: Annotated[Outputs, Mark.INLINE] = field(default_factory=Outputs)
 
 
 def main(words: Sequence[str]) -> int:

@@ -1,9 +1,13 @@
-"""Run a mission and show it: `python -m baselines.run office --strategy best --robots 3 --seed 0`.
+"""Run a mission, show its progress, and print a table of its figures.
 
-Shows a progress bar and a table; with `--out DIR` writes `mission.json` (the figures and time
-series), `mission.png` (curves and maps), `mission.gif` (the mission as it went) and `mission.npz`
-(its record, for `python -m baselines.replay`). Ctrl-C ends the mission after the step under way:
-the same is shown and written of what was done, and the exit code is 130.
+    python -m baselines.run office --strategy best --robots 3 --seed 0
+    python -m baselines.run office --world map.yaml --out results/mine
+    python -m baselines.run terrain --world dem.tif --clearance-m 20 --robot.max-speed-m-s 1.5
+    python -m baselines.run room --settings mine.json --channel.range-m 5 --gif mission.gif
+
+With `--out DIR` the folder gets mission.json (figures and time series), mission.png (curves and maps),
+mission.gif (the mission as it went) and mission.npz (its record, for `python -m baselines.replay`). Ctrl-C
+ends the mission after the step under way: what was done is shown and written, and the exit code is 130.
 """
 
 from __future__ import annotations
@@ -14,11 +18,12 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, ClassVar
 
-from baselines.cli.arguments import INLINE, OmitArgPrefixes, Positional, option_help, parse, run_command
+from baselines.cli.arguments import parse, run_command
 from baselines.cli.interruption import Interruption
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
+from baselines.cli.options import Mark
 from baselines.cli.progress import progress_bar
 from baselines.cli.task_options import TaskOptions, base_task, parsed_for, tasked
 from baselines.experiments.mission import run_mission, scripted_env
@@ -28,10 +33,9 @@ from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.settings.validation import check_whole
 
-_STRATEGY = f"""Chooses viewpoints. We recommend best, which is {resolved("best")}.
+_STRATEGY = f"""Chooses viewpoints; best is {resolved("best")}. All of them: --help strategy
 {help_text()}
-A learned policy: pretrained:room, the folder of a run of training,
-or the planner with weights of your own: weights.json.
+Learned: pretrained:room, the folder of a run of training, or a file of planner weights, weights.json.
 Your own: my_package.my_module:MyStrategy, path/to/file.py:MyStrategy."""
 
 _PROMISE = "the mission ends after this step, and what was done is shown and written"
@@ -45,19 +49,24 @@ class _MissionInterrupted(Exception):
 class Args:
     """Run a mission of a strategy and show it."""
 
-    scenario: Positional[str] = "room"
-    """A named scenario: room, office, cave, … (docs/environments.md lists them)."""
-    strategy: Annotated[str, option_help(_STRATEGY)] = "gradient"
+    usual: ClassVar = (
+        *("scenario", "strategy", "robots", "seed", "time_limit_s", "settings", "starts"),
+        *("world", "height_m", "voxel_size_m", "out", "gif", "mp4", "rerun", "json"),
+    )
+
+    scenario: Annotated[str, Mark.POSITIONAL] = "room"
+    """Named scenario: room, office, cave, terrain, … (docs/environments.md)."""
+    strategy: Annotated[str, _STRATEGY] = "gradient"
     robots: int = 3
-    """Team size."""
+    """Team size; default: the scenario's."""
     seed: int = 0
-    """Of the world, the starts and every other draw."""
-    task: Annotated[TaskOptions, INLINE] = dataclasses.field(default_factory=TaskOptions)
+    """Seed of the world, the starts and all other draws."""
+    task: Annotated[TaskOptions, Mark.INLINE] = dataclasses.field(default_factory=TaskOptions)
     out: Path | None = None
     """Folder for mission.json, mission.png, mission.gif and mission.npz."""
     record: Path | None = None
     """File for the mission's record, an .npz that baselines.replay runs again."""
-    output: OmitArgPrefixes[Outputs] = dataclasses.field(default_factory=Outputs)
+    output: Annotated[Outputs, Mark.INLINE] = dataclasses.field(default_factory=Outputs)
 
 
 def main(words: Sequence[str]) -> int:

@@ -10,14 +10,13 @@ import contextlib
 import io
 import math
 import os
-import re
 import sys
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldWarning, did_you_mean
+from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldWarning
 from entropy_explore_env.starting import INTERRUPTED
 
 BAD_INPUT = 2
@@ -65,18 +64,6 @@ def home_path(word: str) -> Path:
         raise ValueError(f"{word}: {error}") from None
 
 
-_CHOICE = re.compile(r"invalid choice:? '([^']*)'.*?\((?:choose from )?([^()]*)\)")
-"""How argparse and tyro say that a word is none of those that may stand there."""
-
-
-def with_meant(message: str) -> str:
-    """A parser's message, with the choice at its end that is most like a word that is none."""
-    found = _CHOICE.search(message)
-    if found is None:
-        return message
-    return message.rstrip(".") + did_you_mean(found[1], re.findall(r"[^\s',]+", found[2]))
-
-
 class UsageError(EntropyExploreError):
     """The arguments of a command line do not fit its options."""
 
@@ -92,7 +79,7 @@ class LineParser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Raise a UsageError, for `run_command` to print."""
-        raise UsageError(f"{with_meant(message)}; see --help")
+        raise UsageError(f"{message}; see --help")
 
 
 def _showing_worlds_in_a_line(show: Callable[..., None]) -> Callable[..., None]:

@@ -1,15 +1,21 @@
-"""What a report of a problem needs: versions, what of the extras is there, and where compiled kernels are."""
+"""What a report of a problem needs: versions, what of the extras is there, and where compiled kernels are.
+
+`python -m entropy_explore_env doctor` prints it.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import platform
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from entropy_explore_env.command import LineParser
 from entropy_explore_env.compilation.announcement import short_path
 from entropy_explore_env.compilation.folder import SUFFIX, kernel_folder
 from entropy_explore_env.requirements import extras, needed, pins, version_of
@@ -17,6 +23,17 @@ from entropy_explore_env.version import VERSION
 
 _COMPILER = "llvmlite"
 """What Numba compiles with: of another version than Numba wants, kernels do not compile."""
+
+
+def main(words: Sequence[str]) -> int:
+    """Run the command; return 1 where a problem is found, else 0."""
+    about = "Print versions and what is installed and compiled, for reports of problems."
+    parser = LineParser("python -m entropy_explore_env doctor", description=about)
+    parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
+    given = parser.parse_args(words)
+    found = findings()
+    print(json.dumps(found) if given.json else report(found))
+    return 1 if found["problems"] else 0
 
 
 def findings() -> dict[str, Any]:
@@ -76,7 +93,7 @@ def report(found: dict[str, Any]) -> str:
         )
         lines += [f"  {room}: {files}" for room, files in kernels["rooms"].items()]
         if not kernels["files"]:
-            lines.append("  none yet: the first step compiles for half a minute, or entropy-explore-warm now")
+            lines.append("  none yet: the first step compiles them, or now entropy-explore-env warm")
     lines += [f"problem: {problem}" for problem in found["problems"]] or ["no problem found"]
     return "\n".join(lines)
 

@@ -1,4 +1,4 @@
-"""Compile ahead of time what missions need: `python -m entropy_explore_env.warm [SCENARIO ...]`.
+"""Compile ahead of time what missions need: `python -m entropy_explore_env warm [SCENARIO ...]`.
 
 Without scenarios, all of them. Compiled kernels are kept in NUMBA_CACHE_DIR, or in the user's cache folder.
 Strategies compile their own at their first decision.
@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 import os
-import sys
 import tempfile
 import time
 from collections.abc import Sequence
@@ -20,7 +19,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import NamedTuple
 
-from entropy_explore_env.command import LineParser, run_command
+from entropy_explore_env.command import LineParser
 from entropy_explore_env.compilation.announcement import compiled_kernels, short_path
 from entropy_explore_env.compilation.folder import kernel_folder
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -66,7 +65,7 @@ def main(words: Sequence[str]) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     kind = argparse.RawDescriptionHelpFormatter
-    parser = LineParser(prog="python -m entropy_explore_env.warm", description=__doc__, formatter_class=kind)
+    parser = LineParser(prog="python -m entropy_explore_env warm", description=__doc__, formatter_class=kind)
     parser.add_argument("scenarios", nargs="*", metavar="SCENARIO", help="such as room; default: all")
     parser.add_argument(
         "--processes", type=int, default=os.cpu_count() or 1, metavar="N", help="default: one for each core"
@@ -115,12 +114,3 @@ def warm(name: str) -> Warmed:
 
 def _kernels(count: int) -> str:
     return "1 kernel" if count == 1 else f"{count} kernels"
-
-
-def command() -> int:
-    """The command as a program of its own."""
-    return run_command(main)
-
-
-if __name__ == "__main__":
-    sys.exit(command())

@@ -91,9 +91,7 @@ def test_a_terminal_that_lacks_characters_gets_question_marks(run, monkeypatch):
 
 COMMANDS = (
     "baselines.run",
-    pytest.param("entropy_explore_env.worlds", marks=pytest.mark.long),
-    pytest.param("entropy_explore_env.warm", marks=pytest.mark.long),
-    pytest.param("entropy_explore_env.envs.conformance", marks=pytest.mark.long),
+    pytest.param("entropy_explore_env", marks=pytest.mark.long),
     pytest.param("baselines.benchmark", marks=pytest.mark.long),
     pytest.param("baselines.replay", marks=pytest.mark.long),
     pytest.param("baselines.papers", marks=pytest.mark.long),
@@ -126,10 +124,10 @@ def started(module, needed, folder, does):
 @pytest.mark.parametrize(
     ("module", "needed"),
     [
-        ("baselines.run", "tyro"),
+        ("baselines.run", "docstring_parser"),
         ("training.ppo", "torch"),
         ("benchmarks.speed", "gymnasium"),
-        ("entropy_explore_env.worlds", "gymnasium"),
+        ("entropy_explore_env", "gymnasium"),
     ],
 )
 def test_ctrl_c_while_a_command_is_importing_is_one_line(module, needed, tmp_path):
@@ -139,7 +137,7 @@ def test_ctrl_c_while_a_command_is_importing_is_one_line(module, needed, tmp_pat
 
 
 def test_a_mistake_while_a_command_is_importing_is_shown_in_full(tmp_path):
-    done = started("baselines.run", "tyro", tmp_path, "1 // 0")
+    done = started("baselines.run", "docstring_parser", tmp_path, "1 // 0")
     assert done.returncode == 1 and done.stderr.startswith("Traceback") and "ZeroDivision" in done.stderr
 
 

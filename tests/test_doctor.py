@@ -13,16 +13,25 @@ import pytest
 from numba.core import config
 
 from entropy_explore_env import __version__, doctor
-from entropy_explore_env.__main__ import main
+from entropy_explore_env.__main__ import PARTS, main
 from entropy_explore_env.command import run_command
 
 ROOT = Path(__file__).parents[1]
 
 
-def test_the_version(capsys):
+def test_the_version_and_the_parts(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"entropy_explore_env {__version__}\n"
+    for words in ([], ["--help"]):
+        assert main(words) == 0
+        assert set(PARTS) <= set(capsys.readouterr().out.split())
+
+
+@pytest.mark.parametrize("part", PARTS)
+def test_each_part_has_its_own_help(part, capsys):
     with pytest.raises(SystemExit) as ended:
-        main(["--version"])
-    assert ended.value.code == 0 and capsys.readouterr().out == f"entropy_explore_env {__version__}\n"
+        main([part, "--help"])
+    assert ended.value.code == 0 and f"python -m entropy_explore_env {part}" in capsys.readouterr().out
 
 
 def test_the_doctor_counts_kernels_and_names_versions(tmp_path, capsys, monkeypatch):
@@ -144,8 +153,7 @@ def test_a_library_that_is_not_installed_knows_no_extras(metadata):
     assert found["extras"] == {} and "extras: not known" in doctor.report(found)
 
 
-def test_console_scripts_name_functions():
+def test_the_console_script_names_a_function():
     project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    scripts = re.findall(r'^entropy-explore-\w+ = "([\w.]+):(\w+)"$', project, flags=re.MULTILINE)
-    assert len(scripts) == 4
-    assert all(callable(getattr(importlib.import_module(module), name)) for module, name in scripts)
+    ((module, name),) = re.findall(r'^entropy-explore-env = "([\w.]+):(\w+)"$', project, flags=re.MULTILINE)
+    assert callable(getattr(importlib.import_module(module), name))

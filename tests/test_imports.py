@@ -18,7 +18,7 @@ TRUTH = ("Missions", "World", "load_octomap", "load_world", "save_world")
 """Public names that show the truth: not for strategies."""
 HEAVY = (*PACKAGES[1:], "tests", "torch", "matplotlib", "stable_baselines3", "ray")
 """What importing the library never loads, nor what only some need."""
-FOR_SOME = ("pygame", "av", "rerun", "octomap", "tyro", "rich", "tensorboard", "pandas")
+FOR_SOME = ("pygame", "av", "rerun", "octomap", "docstring_parser", "rich", "tensorboard", "pandas")
 WRONG_IMPORTS = {
     f"{LIBRARY}.belief.raycast": (f"{LIBRARY}.belief.map_update", f"{LIBRARY}.robots.motion"),
     f"{LIBRARY}.belief.paths.lattice": (f"{LIBRARY}.belief.paths.planning",),

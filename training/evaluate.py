@@ -1,9 +1,11 @@
-"""Compare a learned policy with the strategies: `python -m training.evaluate --pretrained room`.
+"""Compare a learned policy with the strategies.
+
+    python -m training.evaluate --pretrained room
+    python -m training.evaluate --strategy runs/mine --against gradient,best --world test/*.png
 
 Runs the policy and its rivals on the same seeds, in worlds of the test split, which no training uses, and
-prints how long their missions take. `--strategy runs/room-3` takes the best policy of a run instead,
-`--strategy runs/weights/weights.json` the planner with the weights that a search found. `baselines.run` and
-`baselines.benchmark` know all of them as strategies: `pretrained:room`, `runs/room-3`, …
+prints how long their missions take. `baselines.run` and `baselines.benchmark` take the same policies as
+strategies: `pretrained:room`, the folder of a run, a file of planner weights.
 """
 
 from __future__ import annotations
@@ -13,11 +15,12 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from baselines.cli.arguments import INLINE, make_folder, parse, print_json, run_command
+from baselines.cli.arguments import make_folder, parse, print_json, run_command
+from baselines.cli.options import Mark
 from baselines.cli.task_options import (
     TaskOptions,
     base_task,
@@ -50,6 +53,11 @@ SIMPLE = ("gradient", "random")
 class Args(WorkerOptions):
     """Compare a learned policy with the strategies."""
 
+    usual: ClassVar = (
+        *("pretrained", "strategy", "against", "scenario", "robots", "seeds", "world", "voxel_size_m"),
+        *("settings", "time_limit_s", "jobs", "cluster", "runs", "json"),
+    )
+
     pretrained: str | None = None
     """A policy that comes with the project: room or plans."""
     strategy: str | None = None
@@ -61,7 +69,7 @@ class Args(WorkerOptions):
     """Named scenario; default: that of training, with its robots, sensors and channel."""
     robots: int | None = None
     """Robots in a team; default: as in training."""
-    task: Annotated[TaskOptions, INLINE] = dataclasses.field(default_factory=TaskOptions)
+    task: Annotated[TaskOptions, Mark.INLINE] = dataclasses.field(default_factory=TaskOptions)
     seeds: int = 100
     """Missions of each strategy, with the seeds 0, 1, …"""
     runs: Path = Path("results/evaluation-runs")

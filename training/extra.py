@@ -8,7 +8,7 @@ import sys
 from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.errors import MissingExtraError
 
-PACKAGES = ("torch", "stable_baselines3", "safetensors", "tyro")
+PACKAGES = ("torch", "stable_baselines3", "safetensors", "docstring_parser")
 _MISSING = next((name for name in PACKAGES if importlib.util.find_spec(name) is None), None)
 if _MISSING is not None:
     _error = MissingExtraError(_MISSING, "training")

@@ -1,17 +1,13 @@
 """Train a policy with PPO (Stable-Baselines3); one network drives every robot.
 
-    python -m training.ppo --scenario room --robots 3 --total-steps 2_500_000 --seed 0 --out runs/room-3
-
-The folder gets `curve.csv` (a row for each validation), TensorBoard's files (`tensorboard --logdir runs`),
-the checkpoints `step-N` (the latest, for `--resume`) and `best-N` (the best in validation), and a mission of
-the best policy as a picture and an animation. `python -m training.evaluate --strategy runs/room-3` compares
-the policy with the strategies. Plans of one's own are learned in and tested in as lists of files:
-
+    python -m training.ppo --scenario room --robots 3 --total-steps 2_500_000 --out runs/room-3
     python -m training.ppo --scenario office --world train/*.png --validation-world val/*.png --out runs/mine
     python -m training.evaluate --strategy runs/mine --world test/*.png
 
-Steps are counted per robot: a step of all missions is missions × robots of them. A robot that drives cannot
-choose; `training/advantages.py` says what is learned of its steps.
+The folder gets `curve.csv` (a row for each validation), TensorBoard's files (`tensorboard --logdir runs`),
+the checkpoints `step-N` (the latest, for `--resume`) and `best-N` (the best in validation), and a mission of
+the best policy as a picture and an animation. Steps are counted per robot: a step of all missions is
+missions × robots of them. `training/advantages.py` says what is learned while a robot drives.
 """
 
 from __future__ import annotations
@@ -24,7 +20,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 import torch
@@ -33,8 +29,9 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
-from baselines.cli.arguments import INLINE, WholeNumber, make_folder, parse, print_json, run_command
+from baselines.cli.arguments import make_folder, parse, print_json, run_command
 from baselines.cli.interruption import Interruption
+from baselines.cli.options import Mark
 from baselines.cli.task_options import (
     TaskOptions,
     absolute_files,
@@ -106,13 +103,18 @@ _UPDATES, _LEAST = 8, (8, 16)
 class Args:
     """Train a policy with PPO."""
 
+    usual: ClassVar = (
+        *("scenario", "robots", "missions", "total_steps", "seed", "world", "validation_world", "settings"),
+        *("actions", "reward", "threads", "out", "resume", "start", "json"),
+    )
+
     scenario: str = "room"
     """Named scenario: room, room-furnished, office, … (docs/environments.md lists them)."""
     robots: int = 3
     """Robots in a team."""
     missions: int = 64
     """Missions simulated at a time; fewer by default where --total-steps is small."""
-    total_steps: WholeNumber = 2_500_000
+    total_steps: int = 2_500_000
     """Steps to train for, counted per robot."""
     seed: int = 0
     """Seed of weights, missions and all other draws."""
@@ -130,7 +132,7 @@ class Args:
     seconds: less the seconds that the mission takes, and nothing else."""
     cost_per_s: float | None = None
     """Cost of a second, as a share of all bits that the mission has to gain; default: the scenario's."""
-    task: Annotated[TaskOptions, INLINE] = dataclasses.field(default_factory=TaskOptions)
+    task: Annotated[TaskOptions, Mark.INLINE] = dataclasses.field(default_factory=TaskOptions)
     validation_world: tuple[str, ...] = ()
     """World files of validation, read as those of --world; default: the same as those learned in."""
 
@@ -183,13 +185,13 @@ class Args:
     start: str | None = None
     """A run or a checkpoint whose weights to begin with; default: fresh ones."""
 
-    validate_every: WholeNumber = 250_000
+    validate_every: int = 250_000
     """Steps between two validations."""
     validation_missions: int = 32
     """Missions in a validation."""
     video: bool = True
     """At the end, run a mission of the best policy and write it as a picture and an animation."""
-    checkpoint_every: WholeNumber = 500_000
+    checkpoint_every: int = 500_000
     """Steps between two checkpoints, the first after the first update: what a run that is killed loses at
     most; one that Ctrl-C stops loses nothing."""
 

@@ -22,10 +22,11 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from baselines.cli.arguments import INLINE, WholeNumber, make_folder, parse, run_command
+from baselines.cli.arguments import make_folder, parse, run_command
 from baselines.cli.interruption import Interruption
+from baselines.cli.options import Mark
 from baselines.cli.task_options import (
     TaskOptions,
     base_task,
@@ -77,11 +78,16 @@ LOSSES = ("total_loss", "policy_loss", "vf_loss", "entropy")
 class Args:
     """Train a policy with RLlib's PPO."""
 
+    usual: ClassVar = (
+        *("scenario", "robots", "runners", "missions", "total_steps", "seed", "world", "settings"),
+        *("time_limit_s", "features", "batch", "address", "out", "resume"),
+    )
+
     scenario: str = "room"
     """Named scenario: room, room-furnished, office, … (docs/environments.md lists them)."""
     robots: int = 3
     """Robots in a team."""
-    total_steps: WholeNumber = 1_000_000
+    total_steps: int = 1_000_000
     """Robots' decisions to train for."""
     seed: int = 0
     """Seed of weights, missions and all other draws."""
@@ -95,7 +101,7 @@ class Args:
     """Processes that collect experience; 0: the trainer itself does."""
     missions: int = 32
     """Missions in each runner."""
-    task: Annotated[TaskOptions, INLINE] = field(default_factory=TaskOptions)
+    task: Annotated[TaskOptions, Mark.INLINE] = field(default_factory=TaskOptions)
     cost_per_s: float | None = None
     """Cost of a second, as a share of all bits that the mission has to gain; default: the scenario's."""
 
@@ -126,7 +132,7 @@ class Args:
     epochs: int = 4
     """Passes over an iteration's decisions."""
 
-    validate_every: WholeNumber = 100_000
+    validate_every: int = 100_000
     """Decisions between two validations; there is one at the end."""
     validation_missions: int = 32
     """Missions in a validation."""

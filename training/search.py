@@ -30,7 +30,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -80,6 +80,11 @@ _STOPPED = "pairs that are done are kept, those under way are run again"
 @dataclass
 class Args(WorkerOptions):
     """Find weights of the planner's features by pairs of whole missions."""
+
+    usual: ClassVar = (
+        *("tasks", "out", "begin", "candidates", "rounds", "pairs", "sigma", "step", "seed"),
+        *("jobs", "cluster", "json"),
+    )
 
     tasks: tuple[str, ...] = ("office:1", "office:3", "hybrid:1")
     """Named scenarios with their robots, NAME:ROBOTS; worlds of the split train."""

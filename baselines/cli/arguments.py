@@ -6,87 +6,30 @@ are those of `entropy_explore_env.command`; 1: a claim or goal does not hold whe
 
 from __future__ import annotations
 
-import contextlib
+import argparse
 import dataclasses
-import io
+import difflib
 import json
 import re
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from decimal import Decimal
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeVar
+from typing import Any, TypeVar
 
+from baselines.cli.help import help_text
+from baselines.cli.options import Option, options_of, values_of
 from entropy_explore_env import command
-from entropy_explore_env.command import UsageError, home_path, whole_number, with_meant
-from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.command import LineParser, UsageError
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.worlds.given import distinct_paths
-
-if TYPE_CHECKING:
-    from tyro.conf import OmitArgPrefixes, Positional
-
-    WholeNumber = int
-    INLINE: Any
-    ONCE_WORLD: Any
-    _WHOLE: Any
-    _PATH: Any
-else:
-    try:
-        from tyro.conf import OmitArgPrefixes, Positional, arg
-        from tyro.constructors import PrimitiveConstructorSpec
-
-        _WHOLE = PrimitiveConstructorSpec(
-            nargs=1,
-            metavar="INT",
-            instance_from_str=lambda words: whole_number(words[0]),
-            is_instance=lambda value: isinstance(value, int) and not isinstance(value, bool),
-            str_from_instance=lambda value: [str(value)],
-        )
-        _PATH = PrimitiveConstructorSpec(
-            nargs=1,
-            metavar="PATH",
-            instance_from_str=lambda words: home_path(words[0]),
-            is_instance=lambda value: isinstance(value, Path),
-            str_from_instance=lambda value: [str(value)],
-        )
-        WholeNumber = Annotated[int, _WHOLE]
-        """Of a field: an int that may also be typed as 1e6, as all ints of commands may."""
-        INLINE = arg(name="")
-        """`Annotated[Options, INLINE]`: the options of a dataclass without the field's name before theirs."""
-        ONCE_WORLD = arg(aliases=("--world",))
-        """`Annotated[str, ONCE_WORLD]`: an option that was `--world`, which is still taken."""
-    except ImportError:  # `parse` says what is missing
-
-        class Positional:
-            """Stands in for tyro's."""
-
-            def __class_getitem__(cls, kind: type) -> type:
-                """The kind itself."""
-                return kind
-
-        OmitArgPrefixes, WholeNumber, INLINE, ONCE_WORLD = Positional, int, None, None
 
 Arguments = TypeVar("Arguments")
 
-_FRAME = re.compile(r"[─-╿]+|-{4,}")
-"""The lines around the parser's message, also where a terminal has no characters for them."""
-_TITLE = re.compile(r"^(Unrecognized options|Invalid choice|Value error|Parsing error|Required options) ")
-"""What stands on the parser's frame; the message says it again."""
-_HELP = re.compile(r" Argument helptext: .*?(?= For full helptext|$)")
-"""The text of the option that was wrong: `--help` has it."""
-
-
-_MEANT = re.compile(r" Perhaps you meant: (--[\w.-]+).*")
-"""An option that is like the one that is none, with its help."""
-
-
-def option_help(text: str) -> Any:  # noqa: ANN401 - tyro's
-    """Return the annotation that gives an option a computed help text."""
-    try:
-        from tyro.conf import arg
-    except ImportError:  # `parse` says what is missing
-        return None
-    return arg(help=text)
+_HELP = ("-h", "--help")
+_NEGATIVE = re.compile(r"-[\d.]+e[+-]?\d+", re.IGNORECASE)
+"""A negative number with an exponent, which argparse takes for a flag."""
 
 
 def parse(
@@ -95,62 +38,147 @@ def parse(
     default: Arguments | None = None,
     description: str | None = None,
 ) -> Arguments:
-    """Arguments from the words of a command line.
+    """Return the arguments in the words of a command line.
 
     Args:
-        kind: A dataclass; its fields, all with defaults, are the options.
+        kind: A dataclass; its fields, all with defaults, are the options. Its class variable `usual` names
+            those that the short help shows, by default all but those of parts.
         words: What follows the command.
-        default: Values for what is not given; None = those of the dataclass.
-        description: The first line of the help.
+        default: Values of options that are not given; None = those of the dataclass.
+        description: What the help begins with; None = the dataclass's docstring.
 
     Raises:
         UsageError: The words do not fit; the message is one line.
+        SettingError: A value is not allowed.
         SystemExit: The help was asked for.
     """
+    start = kind() if default is None else default
+    options = options_of(kind, start)
+    asked = next((place for place, word in enumerate(words) if word in _HELP), None)
+    if asked is not None:
+        topic = words[asked + 1] if asked + 1 < len(words) else None
+        about = description or kind.__doc__ or ""
+        print(help_text(_program(), about, options, getattr(kind, "usual", ()), topic))
+        raise SystemExit(0)
+    return overlaid(start, _given(options, [_spelled(word) for word in words]))
+
+
+def _spelled(word: str) -> str:
+    """Return a word as argparse reads it: options with hyphens, negative numbers without an exponent."""
+    if word.startswith("--"):
+        name, equals, value = word.partition("=")
+        return name.replace("_", "-") + equals + value
+    return format(Decimal(word), "f") if _NEGATIVE.fullmatch(word) else word
+
+
+def _given(options: Iterable[Option], words: Sequence[str]) -> dict[str, Any]:
+    """Return the values that words give to options, as a tree along the options' paths."""
+    parser = LineParser(_program(), add_help=False, allow_abbrev=False, argument_default=argparse.SUPPRESS)
+    for option in options:
+        _add(parser, option)
+    found, unknown = parser.parse_known_intermixed_args(words)
+    if unknown and unknown[0].startswith("-"):
+        raise UsageError(f"{unknown[0]}: no such option{_meant(unknown, options) or '; see --help'}")
+    if unknown:
+        raise UsageError(f"{unknown[0]}: expected an option; see --help")
+    tree: dict[str, Any] = {}
+    for option in options:
+        value = getattr(found, option.name, None)
+        if value is None or (option.positional and value == []):
+            continue
+        inner = tree
+        for name in option.path[:-1]:
+            inner = inner.setdefault(name, {})
+        inner[option.path[-1]] = _joined(option, value)
+    return tree
+
+
+def _add(parser: argparse.ArgumentParser, option: Option) -> None:
+    """Let a parser take an option."""
+    values = values_of(option.kind)
+
+    def read(word: str) -> Any:  # noqa: ANN401
+        try:
+            return values.read(word)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(f"{word!r}: expected {error}") from None
+
+    if option.positional:
+        parser.add_argument(
+            option.name, nargs=values.count or "?", type=read, default=None, metavar=values.shown
+        )
+    elif option.kind is bool:
+        parser.add_argument(option.flag, dest=option.name, action="store_const", const=True)
+        parser.add_argument(option.opposite, dest=option.name, action="store_const", const=False)
+    else:
+        parser.add_argument(
+            option.flag, *option.also, dest=option.name, nargs=values.count, type=read, metavar=values.shown
+        )
+
+
+def _joined(option: Option, value: Any) -> Any:  # noqa: ANN401
+    """Return an option's value out of those of its words."""
+    joined = values_of(option.kind).joined
+    if joined is None:
+        return value
     try:
-        import tyro
-    except ImportError:
-        raise MissingExtraError("tyro", "baselines") from None
-    complaint = io.StringIO()
+        return joined(value)
+    except ValueError as error:
+        raise UsageError(f"{option.flag}: expected {error}; see --help {option.name}") from None
+
+
+_ALIKE = 0.6
+"""Least likeness of a flag that may be meant."""
+
+
+def _meant(words: Sequence[str], options: Iterable[Option]) -> str:
+    """Return the flag most like an unknown one, as the end of a message.
+
+    Flags with its prefix come first, and those that take the word that follows it.
+    """
+    flag, equals, value = words[0].partition("=")
+    following = value if equals else next(iter(words[1:]), None)
+    best, score = "", 0.0
+    for option in options:
+        prefix, _, last = option.flag.rpartition(".")
+        alike = max(_likeness(flag, option.flag), _likeness(flag.rpartition(".")[2], last))
+        if option.positional or alike < _ALIKE:
+            continue
+        alike += 0.2 * (flag.rpartition(".")[0] == prefix) + 0.1 * _takes(option, following)
+        if alike > score:
+            best, score = option.flag, alike
+    return f"; did you mean {best}?" if best else ""
+
+
+def _likeness(one: str, other: str) -> float:
+    return difflib.SequenceMatcher(None, one.strip("-"), other.strip("-")).ratio()
+
+
+def _takes(option: Option, word: str | None) -> bool:
+    """Return whether an option takes a word, or none where none follows."""
+    if word is None or option.kind is bool:
+        return word is None and option.kind is bool
     try:
-        with contextlib.redirect_stderr(complaint):
-            start = kind() if default is None else default
-            return tyro.cli(
-                kind,
-                prog=_program(),
-                args=list(words),
-                description=description,
-                default=start,
-                registry=_registry(),
-                config=(tyro.conf.DisallowNone,),  # options that are not given are None: nobody types it
-            )
-    except SystemExit as stop:
-        if stop.code in (0, None):
-            raise
-        raise UsageError(_one_line(complaint.getvalue())) from None
+        values_of(option.kind).read(word)
+    except ValueError:
+        return False
+    return True
 
 
-def _registry() -> Any:  # noqa: ANN401 - tyro comes late
-    """How fields of a kind are typed in all commands: whole numbers also as 1e6, paths also with `~`."""
-    from tyro.constructors import ConstructorRegistry
-
-    registry = ConstructorRegistry()
-    registry.primitive_rule(lambda field: {int: _WHOLE, Path: _PATH}.get(field.type))
-    return registry
+def overlaid(base: Any, changes: Mapping[str, Any]) -> Any:  # noqa: ANN401 - any dataclass
+    """Return a dataclass with some fields changed, all at once; a mapping changes fields of a field."""
+    values = {}
+    for name, value in changes.items():
+        own = getattr(base, name)
+        inner = isinstance(value, Mapping) and dataclasses.is_dataclass(own)
+        values[name] = overlaid(own, value) if inner else value
+    return dataclasses.replace(base, **values)
 
 
 def _program() -> str:
-    """How the command was started, as one types it."""
+    """Return how the command was started, as one types it."""
     module = getattr(sys.modules["__main__"], "__spec__", None)
     return Path(sys.argv[0]).name if module is None else f"python -m {module.name.removesuffix('.__main__')}"
-
-
-def _one_line(complaint: str) -> str:
-    """The parser's framed message as one line; tyro 1.0 has errors as values in a private module only."""
-    words = " ".join(_FRAME.sub(" ", complaint).split())
-    words = _TITLE.sub("", words)
-    words = _MEANT.sub(r"; did you mean \1?", _HELP.sub("", words))
-    return with_meant(words.split(" For full helptext")[0]) or "the arguments do not fit; see --help"
 
 
 def run_command(main: Callable[[Sequence[str]], int], words: Sequence[str] | None = None) -> int:

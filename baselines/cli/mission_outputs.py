@@ -33,7 +33,7 @@ _SERIES_POINTS = 500
 
 @dataclass
 class Outputs:
-    """Files of any mission that is run or replayed, and the form of its results."""
+    """Files to write, and the form of the results."""
 
     gif: Path | None = None
     """File for an animated GIF of the mission."""
@@ -42,7 +42,7 @@ class Outputs:
     rerun: Path | None = None
     """File for a recording, an .rrd that Rerun's viewer opens (extra viewer)."""
     truth: bool = False
-    """With --out: the true world beside the map in mission.png."""
+    """Show the true world beside the map in mission.png; needs --out."""
     json: bool = False
     """Print one JSON object and nothing else."""
 

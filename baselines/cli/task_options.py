@@ -13,9 +13,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple, Protocol, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple, Protocol, TypeVar
 
-from baselines.cli.arguments import OmitArgPrefixes
+from baselines.cli.arguments import overlaid
+from baselines.cli.options import Mark
 from baselines.cli.start_options import given_json, reset_options
 from baselines.cli.world_options import Reading, world_settings
 from baselines.experiments.mission import Surroundings
@@ -41,28 +42,28 @@ _WITHIN = ("settings", "scenario")
 
 @dataclass
 class TaskOptions:
-    """What missions are run; the defaults are a scenario's."""
+    """The task of the missions; defaults are those of the scenario."""
 
     settings: str | None = None
-    """A scenario as JSON, or a file of it, whole or some of its settings, which change the named scenario; a
-    mission.json, too. Options change it further."""
+    """Scenario as JSON, or a file of it such as a mission.json: all of its settings, or some that change the
+    named scenario. Options change it further."""
     world: tuple[str, ...] = ()
-    """World files in place of the scenario's worlds, dealt to missions in turn by their seeds;
-    entropy_explore_env.worlds lists the kinds."""
+    """World files in place of the scenario's worlds, dealt to missions in turn by their seeds. `python -m
+    entropy_explore_env worlds list` shows the kinds."""
     voxel_size_m: float | None = None
-    """Resample the world files' voxels to this size; default: the scenario's."""
-    world_file: OmitArgPrefixes[Reading] = field(default_factory=Reading)
+    """Size to which the voxels of world files are resampled; default: the scenario's."""
+    world_file: Annotated[Reading, Mark.INLINE] = field(default_factory=Reading)
     world_number: int | None = None
-    """The world with this number of the scenario's recipe; default: drawn by the seed."""
+    """Number of a world of the scenario's recipe; default: drawn by the seed."""
     split: Literal["train", "validation", "test"] = "train"
-    """Which worlds of the recipe: those of training, validation or test."""
+    """Worlds of the recipe that are drawn: those of training, validation or test."""
     starts: str | None = None
-    """Poses of all robots as JSON, or a file of it: [[x, y, z, yaw, pitch], ...] in metres and radians,
-    of planar robots also [x, y, yaw]; default: drawn by the seed."""
+    """Poses of all robots as JSON, or a file of it: [[x, y, z, yaw, pitch], ...] in metres and radians, for
+    planar robots also [x, y, yaw]; default: drawn by the seed."""
     start_radius_m: float = ROOM.start_radius_m
-    """Robots start at most so far from where the first one does."""
+    """Largest distance of a robot's start from that of the first one."""
     decision_period_s: float | None = None
-    """Length of a step in seconds; default: until the next robot has to decide."""
+    """Length of a step; default: until the next robot has to decide."""
     extra_kinds: str | None = None
     """Further kinds of robots as JSON, or a file of it: [{"robot": {"reach_m": 2}, "sensor": {}}, ...]."""
     robot: Robot = field(default_factory=Robot)
@@ -71,7 +72,7 @@ class TaskOptions:
     fiducials: Fiducials = field(default_factory=Fiducials)
     ending: Ending = field(default_factory=Ending)
     time_limit_s: float | None = None
-    """Short for --ending.time-limit-s."""
+    """Simulated seconds until a mission is cut off; short for --ending.time-limit-s."""
 
 
 def given_in(words: Sequence[str]) -> list[str]:
@@ -212,24 +213,13 @@ def options_for(task: BaseTask, options: TaskOptions, words: Sequence[str]) -> T
     reading = {each.name for each in dataclasses.fields(Reading)}
     given: dict[str, Any] = {}
     for name in filter(is_of_task, given_in(words)):
-        path = name.split(".")
-        path = ["world_file", *path] if path[0].removeprefix("no_") in reading else path
-        inner = given
+        path = [part.removeprefix("no_") for part in name.split(".")]
+        path = ["world_file", *path] if path[0] in reading else path
+        inner, value = given, options
         for part in path[:-1]:
-            inner = inner.setdefault(part, {})
-        inner[path[-1]] = None
-    return _overlaid(task.defaults(options.settings), options, given)
-
-
-def _overlaid(base: Any, options: Any, given: Mapping[str, Any]) -> Any:  # noqa: ANN401 - any dataclass
-    """Return a dataclass with some fields of another one, all changed at once."""
-    changes = {}
-    for part, inner in given.items():
-        name = part if hasattr(options, part) else part.removeprefix("no_")
-        own, other = getattr(base, name), getattr(options, name)
-        within = inner and dataclasses.is_dataclass(own)
-        changes[name] = _overlaid(own, other, inner) if within else other
-    return dataclasses.replace(base, **changes)
+            inner, value = inner.setdefault(part, {}), getattr(value, part)
+        inner[path[-1]] = getattr(value, path[-1])
+    return overlaid(task.defaults(options.settings), given)
 
 
 def tasked(

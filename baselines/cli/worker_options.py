@@ -24,10 +24,10 @@ class WorkerOptions:
     """Processes of this machine, or a cluster."""
 
     jobs: int | None = None
-    """Missions at a time; default: one a processor."""
+    """Missions at a time; default: one per processor."""
     cluster: str | None = None
-    """Run missions on a Ray cluster: its HOST:PORT, auto for the one that this machine belongs to, local for
-    one of this machine alone; default: processes of this machine, without Ray."""
+    """Ray cluster to run missions on: HOST:PORT, auto for the one that this machine belongs to, local for one
+    of this machine alone; default: processes of this machine."""
 
     @property
     def workers(self) -> int | RayCluster:
@@ -52,9 +52,9 @@ class TrialOptions(WorkerOptions):
     """Where trials run, and which of them again."""
 
     rerun: bool = False
-    """Run all of them, also those that the table has."""
+    """Run all missions, also those that are done."""
     since: str | None = None
-    """Run those again whose row is of a git commit before this one."""
+    """Run missions again that are older than this git commit."""
 
     def how(self, title: str, quiet: bool, limit_s: float = math.inf, **more: bool | float) -> How:
         """Return how trials are run.

@@ -12,7 +12,7 @@ from entropy_explore_env.errors import SettingError
 
 @dataclass
 class Reading:
-    """How a world file is read; refused where it means nothing for the file. Metres, seconds."""
+    """How world files are read; refused for files of other kinds."""
 
     height_m: float | None = None
     """Extrude a plan to this height."""

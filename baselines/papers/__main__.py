@@ -10,9 +10,10 @@ import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from baselines.cli.arguments import Positional, given_options, make_folder, parse, print_json, run_command
+from baselines.cli.arguments import given_options, make_folder, parse, print_json, run_command
+from baselines.cli.options import Mark
 from baselines.cli.worker_options import TrialOptions
 from baselines.papers import PAPERS
 from entropy_explore_env.errors import SettingError, one_of
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 class Args(TrialOptions):
     """Reproduce a paper."""
 
-    paper: Positional[str] = "rocha04"
+    paper: Annotated[str, Mark.POSITIONAL] = "rocha04"
     """rocha04, rochami, bhattacharya, sawhney or sujan; of Sujan also one of its six experiments, such as
     sujan-cliff."""
     quick: bool = False

@@ -8,7 +8,6 @@ go to.
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
@@ -258,16 +257,11 @@ ALIASES: MappingProxyType[str, str] = MappingProxyType({"best": "planned-rate"})
 """Alias → the name that tables and records hold."""
 
 
-def help_text(width: int = 70) -> str:
-    """Return what `--help` says of the strategies of the package: their names, family by family.
-
-    Args:
-        width: Of a line, in characters.
-    """
-    paragraphs = [
+def help_text() -> str:
+    """Return what `--help` says of the strategies of the package: a paragraph of names for each family."""
+    return "\n".join(
         f"{family.value}: {', '.join(entry.name for entry in entries)}." for family, entries in TABLE.items()
-    ]
-    return "\n".join(textwrap.fill(each, width, break_on_hyphens=False) for each in paragraphs)
+    )
 
 
 def suite_names(suite: str) -> tuple[str, ...]:

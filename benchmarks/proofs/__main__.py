@@ -13,11 +13,12 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader
 
-from baselines.cli.arguments import Positional, make_folder, parse, run_command
+from baselines.cli.arguments import make_folder, parse, run_command
+from baselines.cli.options import Mark
 from baselines.experiments.origin import this_origin
 from baselines.experiments.tables import markdown_table
 from benchmarks.proofs import determinism, files, kills, settings, soak, states, training
@@ -72,7 +73,7 @@ class Args:
         out: Markdown file for the page.
     """
 
-    names: Positional[tuple[str, ...]] = ()
+    names: Annotated[tuple[str, ...], Mark.POSITIONAL] = ()
     cases: int | None = None
     full: bool = False
     first: int = 0

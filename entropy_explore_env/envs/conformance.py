@@ -2,7 +2,7 @@
 
     check_conformance("room", robots=3)        # raises a ConformanceError that says what differed
 
-or `python -m entropy_explore_env.envs.conformance room --robots 3`, which exits with 0 if all
+or `python -m entropy_explore_env conformance room --robots 3`, which exits with 0 if all
 checks hold, 1 if one does not, and 2 on bad input. Exactly means: the same types, keys in the same
 order, and the same bits in every array and number.
 """
@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.command import LineParser, run_command
+from entropy_explore_env.command import LineParser
 from entropy_explore_env.envs.episodes import (
     EPISODES,
     OTHER_ACTIONS,
@@ -296,7 +296,7 @@ def check_conformance(
 
 def main(words: Sequence[str]) -> int:
     """The command; returns its exit code: 0 all holds, 1 something does not."""
-    parser = LineParser("python -m entropy_explore_env.envs.conformance")
+    parser = LineParser("python -m entropy_explore_env conformance")
     parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario")
     parser.add_argument("--world", help="a world file in place of the scenario's world")
     parser.add_argument("--robots", type=int, help="team size; default: the scenario's")
@@ -322,12 +322,3 @@ def main(words: Sequence[str]) -> int:
     elif broken is not None:
         print(f"does not hold: {broken}")
     return 0 if broken is None else 1
-
-
-def command() -> int:
-    """The command as a program of its own."""
-    return run_command(main)
-
-
-if __name__ == "__main__":
-    sys.exit(command())

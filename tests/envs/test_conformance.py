@@ -416,7 +416,7 @@ def test_nan_is_the_same_as_nan_and_bytes_between_fields_mean_nothing() -> None:
 def command(*arguments: str) -> subprocess.CompletedProcess[str]:
     path = os.pathsep.join(part or os.curdir for part in sys.path)
     return subprocess.run(
-        [sys.executable, "-m", "entropy_explore_env.envs.conformance", *arguments],
+        [sys.executable, "-m", "entropy_explore_env", "conformance", *arguments],
         capture_output=True,
         text=True,
         env={**os.environ, "PYTHONPATH": path},

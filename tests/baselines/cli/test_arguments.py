@@ -3,108 +3,235 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, ClassVar, Literal
 
 import pytest
 
-from baselines.cli.arguments import WholeNumber, parse, print_json, run_command, whole_number
+from baselines.cli.arguments import parse, print_json, run_command
+from baselines.cli.options import Also, Mark, options_of
 from entropy_explore_env.command import BAD_INPUT, UsageError
-from entropy_explore_env.errors import MissingExtraError
+from entropy_explore_env.errors import SettingError
+
+
+@dataclass(frozen=True)
+class Wheel:
+    """A wheel.
+
+    Attributes:
+        radius_m, width_m: Of the tyre.
+        spokes: How many.
+    """
+
+    radius_m: float = 0.3
+    width_m: float = 0.05
+    spokes: int | None = None
+
+    def __post_init__(self):
+        if self.radius_m <= 0:
+            raise SettingError("Wheel.radius_m", self.radius_m, "a number > 0")
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body: what stands on wheels."""
+
+    wheel: Wheel = field(default_factory=Wheel)
+    places_m: tuple[tuple[float, float], ...] = ()
+    turns: Literal["left", "right"] | float = "left"
+    lights: bool = True
+
+
+@dataclass
+class More:
+    """More of it."""
+
+    tags: tuple[str, ...] = ("a", "b")
+    """Words."""
+    size: tuple[int, int] = (1, 2)
+    """Two numbers."""
 
 
 @dataclass
 class Args:
     """Do something."""
 
+    usual: ClassVar = ("name", "tags", "number")
+
+    name: Annotated[str, Mark.POSITIONAL] = "room"
+    """Which."""
     number: int = 3
     """How many."""
-    folder: Path | None = None
+    most: int | None = None
+    """At most."""
+    folder: Annotated[Path | None, Also("--dir")] = None
     """Where."""
     loud: bool = False
     """Whether to shout."""
+    more: Annotated[More, Mark.INLINE] = field(default_factory=More)
+    body: Body = field(default_factory=Body)
 
 
-def test_words_become_arguments():
-    assert parse(Args, []) == Args()
-    assert parse(Args, ["--number", "5", "--folder", "a/b", "--loud"]) == Args(5, Path("a/b"), True)
-    assert parse(Args, ["--loud"], default=Args(7)) == Args(7, None, True)
+@pytest.mark.parametrize(
+    ("words", "args"),
+    [
+        ("", Args()),
+        ("office --number 5 --folder a/b --loud", Args("office", 5, None, Path("a/b"), True)),
+        ("--number=5 office --dir a --no-loud", Args("office", 5, None, Path("a"))),
+        ("--number 1 --tags --size 3 4 --number 2", Args(number=2, more=More((), (3, 4)))),
+        ("--tags c d -- office", Args("office", more=More(("c", "d")))),
+        ("--body.wheel.radius_m 1 --body.no-lights", Args(body=Body(Wheel(1.0), lights=False))),
+        ("--body.wheel.radius-m inf --body.turns right", Args(body=Body(Wheel(math.inf), turns="right"))),
+        ("--body.turns -2e-1", Args(body=Body(turns=-0.2))),
+        ("--body.places-m -1 2 3 -4e1", Args(body=Body(places_m=((-1.0, 2.0), (3.0, -40.0))))),
+    ],
+)
+def test_words_become_arguments(words, args):
+    assert parse(Args, words.split()) == args
+
+
+def test_what_is_not_given_is_as_in_the_default():
+    default = Args("cave", 7, body=Body(Wheel(spokes=4)))
+    given = parse(Args, ["--body.wheel.radius-m", "2"], default=default)
+    assert given == Args("cave", 7, body=Body(Wheel(2.0, spokes=4)))
+
+
+@pytest.mark.parametrize(
+    ("word", "number"),
+    [
+        ("1e6", 10**6),
+        ("2.5e6", 2_500_000),
+        ("2_500", 2500),
+        ("-3", -3),
+        ("-1e3", -1000),
+        ("9007199254740993", 2**53 + 1),
+    ],
+)
+def test_a_whole_number_may_be_typed_with_an_exponent(word, number):
+    assert parse(Args, ["--number", word, "--most", word]) == Args(number=number, most=number)
+
+
+def test_paths_begin_at_home(monkeypatch, tmp_path):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert parse(Args, ["--folder", "~/b/c"]).folder == tmp_path / "b" / "c"
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--number", "many"], "--number"),
-        (["--number"], "--number"),
-        (["--nmber", "3"], "--nmber, 3; did you mean --number?"),
-        (["stray"], "stray"),
-        (["--loud", "yes"], "yes"),
+        ("--number many", "argument --number: 'many': expected a whole number; see --help"),
+        *((f"--number={word}", "whole number") for word in ("1.5", "1e-1", "inf", "nan", "1e400", "")),
+        ("--number", "argument --number: expected one argument"),
+        ("--size 1", "argument --size: expected 2 arguments"),
+        ("--most x", "--most"),
+        ("--folder ~nobody-of-this-name/a", "no such home folder"),
+        ("--nmber 3", "--nmber: no such option; did you mean --number?"),
+        ("--radius-m 3", "did you mean --body.wheel.radius-m?"),
+        ("--body.light", "did you mean --body.lights?"),
+        ("--what-else 3", "--what-else: no such option; see --help"),
+        ("office stray", "stray: expected an option"),
+        ("--body.turns lef", "expected one of left, right; did you mean left?, or a number"),
+        ("--body.places-m 1 2 3", "--body.places-m: expected 2 numbers each"),
+        ("--num 3", "did you mean --number?"),
     ],
 )
 def test_words_that_do_not_fit_are_named_in_one_line_and_print_nothing(words, said, capsys):
     with pytest.raises(UsageError) as error:
-        parse(Args, words)
+        parse(Args, words.split())
     assert said in str(error.value) and "\n" not in str(error.value)
-    assert not set(str(error.value)) & set("│╭╮╰╯─")
-    assert "helptext" not in str(error.value) and "---" not in str(error.value)
     assert capsys.readouterr() == ("", "")
 
 
-@dataclass
-class Choices:
-    """Choose."""
+@dataclass(frozen=True)
+class Part:
+    """A part."""
 
-    split: Literal["train", "validation", "test"] = "train"
-    """Of which worlds."""
-
-
-@pytest.mark.parametrize(("word", "meant"), [("tests", "; did you mean test?"), ("xyz", ")")])
-def test_a_choice_that_is_nearly_right_is_answered_with_the_right_one(word, meant):
-    with pytest.raises(UsageError, match=r"--split.*'train', 'validation', 'test'") as error:
-        parse(Choices, ["--split", word])
-    assert str(error.value).endswith(meant)
+    range_m: float = 1.0
+    range_of: str = ""
 
 
 @dataclass
-class Counts:
-    """Count."""
+class Two:
+    """Two parts."""
 
-    steps: WholeNumber = 3
-    """How many."""
-    most: WholeNumber | None = None
-    """At most."""
+    one: Part = field(default_factory=Part)
+    other: Part = field(default_factory=Part)
+
+
+def test_a_flag_that_is_meant_has_the_same_prefix_and_takes_the_value():
+    for word, meant in (("--other.range 2", "--other.range-m"), ("--other.range-mo x", "--other.range-of")):
+        with pytest.raises(UsageError, match=f"did you mean {meant}"):
+            parse(Two, word.split())
+
+
+def test_a_value_that_is_not_allowed_is_the_settings_own_error():
+    with pytest.raises(SettingError, match=r"Wheel.radius_m = -1.0"):
+        parse(Args, ["--body.wheel.radius-m", "-1"])
+
+
+def help_of(*words, capsys, width="80"):
+    with pytest.raises(SystemExit) as stop:
+        run_command(lambda words: 0 if parse(Args, words) else 1, ["--help", *words])
+    out, err = capsys.readouterr()
+    assert stop.value.code in (0, None) and err == ""
+    assert max(map(len, out.splitlines())) <= int(width) and "\n\n\n" not in out
+    return out
+
+
+def test_the_short_help_shows_what_is_usual_and_names_the_other_parts(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    said = help_of(capsys=capsys)
+    assert "Do something." in said and "usage: " in said and "[NAME] [OPTIONS]" in said
+    assert said.index("NAME  ") < said.index("--tags TEXT ...") < said.index("--number INT")
+    assert "Words. (default: a b)" in said
+    assert "--loud" not in said and "--body.lights" not in said and "--size" not in said
+    assert "others                    What is less often given (3 options)" in said
+    assert "body                      A body (6 options)" in said
 
 
 @pytest.mark.parametrize(
-    ("word", "number"),
-    [("1e6", 10**6), ("2.5e6", 2_500_000), ("2_500", 2500), ("-3", -3), ("9007199254740993", 2**53 + 1)],
+    ("topic", "there", "not_there"),
+    [
+        ("body", "--body.wheel.radius-m FLOAT", "--loud"),
+        ("body", "--body.lights, --body.no-lights", "--size"),
+        ("others", "--folder, --dir PATH", "--size"),
+        ("more", "--size INT INT", "--number"),
+        ("all", "--body.wheel.width-m FLOAT", "usage"),
+        ("width_m", "Of the tyre. (default: 0.05)", "--number"),
+        ("--number", "How many. (default: 3)", "--loud"),
+    ],
 )
-def test_a_whole_number_may_be_typed_with_an_exponent(word, number):
-    assert whole_number(word) == number
-    assert parse(Counts, ["--steps", word, "--most", word]) == Counts(number, number)
+def test_a_part_or_an_option_has_its_own_help(topic, there, not_there, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "60")
+    said = help_of(topic, capsys=capsys, width="60")
+    assert there in said and not_there not in said
 
 
-@pytest.mark.parametrize("word", ["1.5", "1e-1", "many", "inf", "nan", "1e400", ""])
-def test_what_is_no_whole_number_is_named(word):
-    with pytest.raises(UsageError, match=r"--steps.*is not a whole number"):
-        parse(Counts, [f"--steps={word}"])
-
-
-def test_help_goes_to_standard_output_and_ends_well(capsys):
-    with pytest.raises(SystemExit) as stop:
-        run_command(lambda words: 0 if parse(Args, words) else 1, ["--help"])
+def test_help_on_what_is_not_there_names_the_parts(capsys):
+    assert run_command(lambda words: 0 if parse(Args, words) else 1, ["--help", "bodi"]) == BAD_INPUT
     out, err = capsys.readouterr()
-    assert stop.value.code in (0, None) and err == ""
-    assert "How many." in out and "--number" in out
+    assert out == "" and "others, more, body, all" in err and "did you mean body?" in err
+
+
+def test_fields_that_no_word_can_be_are_refused():
+    @dataclass
+    class Odd:
+        """Odd."""
+
+        table: dict = field(default_factory=dict)
+
+    with pytest.raises(TypeError, match="dict"):
+        parse(Odd, [])
+    assert [option.flag for option in options_of(Wheel, Wheel())] == ["--radius-m", "--width-m", "--spokes"]
 
 
 def test_a_package_that_is_missing_is_named_with_its_extra(capsys, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "tyro", None)
+    monkeypatch.setitem(__import__("sys").modules, "docstring_parser", None)
     assert run_command(lambda words: 0 if parse(Args, words) else 1, []) == BAD_INPUT
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1 and "entropy_explore_env[baselines]" in err
-    assert isinstance(MissingExtraError("tyro", "baselines"), ImportError)
 
 
 def test_json_is_one_object_that_any_reader_takes(capsys):
@@ -114,28 +241,3 @@ def test_json_is_one_object_that_any_reader_takes(capsys):
     with pytest.raises(ValueError, match="JSON"):
         print_json({"a": float("nan")})
     assert capsys.readouterr().out == ""
-
-
-@dataclass
-class Many:
-    """Do something."""
-
-    count: int = 3
-    """How many."""
-    most: int | None = None
-    """At most."""
-    out: Path | None = None
-    """Where."""
-    folder: Path = Path("a")
-    """Where from."""
-
-
-def test_all_whole_numbers_may_be_typed_with_an_exponent_and_all_paths_begin_at_home(monkeypatch, tmp_path):
-    monkeypatch.setenv("HOME", str(tmp_path))
-    assert parse(Many, ["--count", "1e6", "--most", "2.5e3"]) == Many(1_000_000, 2500)
-    assert parse(Many, ["--count", "1_000", "--out", "~/b/c"]) == Many(1000, None, tmp_path / "b" / "c")
-    assert parse(Many, ["--folder", "~"], default=Many(7)).folder == tmp_path
-    assert parse(Many, [], default=Many(7, 8, Path("b"))) == Many(7, 8, Path("b"))
-    for words in (["--count", "1.5"], ["--count", "1e-3"], ["--most", "x"], ["--count", "inf"]):
-        with pytest.raises(UsageError, match=words[0]):
-            parse(Many, words)

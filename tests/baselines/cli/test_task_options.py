@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import importlib
-import io
 import json
-import re
 
 import numpy as np
 import pytest
 from PIL import Image
 
 from baselines.cli.arguments import parse, told_command
+from baselines.cli.options import options_of
 from baselines.cli.task_options import TaskOptions, base_task, options_for, settled, tasked
 from baselines.experiments.mission import Surroundings, run_mission, scripted_env
 from baselines.strategies import make_strategy
@@ -155,50 +153,44 @@ def test_a_page_tells_the_words_without_folders(plans, tmp_path):
     assert told_command("python -m a", words, ("--out", "--json")) == told
 
 
-FLAG = re.compile(r"^[│ ]+(--[a-z][a-z0-9.-]+)((?: [A-Z{\[][^\s│]*)*)", re.MULTILINE)
+def flags_of(command):
+    """Return flag → the kind of its values, of a command's arguments."""
+    args = importlib.import_module(command).Args
+    return {flag: option.kind for option in options_of(args, args()) for flag in (option.flag, *option.also)}
 
 
-COMMANDS = (
-    "baselines.run",
-    "baselines.benchmark",
-    "training.ppo",
-    "training.evaluate",
-    "training.rllib_ppo",
+TASK = {option.flag: option.kind for option in options_of(TaskOptions, TaskOptions())}
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["baselines.run", "baselines.benchmark", "baselines.episodes", "training.ppo", "training.evaluate"],
 )
+def test_every_command_takes_every_flag_of_a_task_with_the_same_values(command):
+    assert {"--settings", "--world", "--split", "--starts", "--extra-kinds", "--robot.reach-m"} <= set(TASK)
+    flags = flags_of(command)
+    assert {name: flags.get(name) for name in TASK} == TASK
+    assert "--robots" in flags
 
 
-def flags_in(help_text):
-    """Flag → the kind of its values."""
-    return {found[1]: found[2].strip() for found in FLAG.finditer(help_text)}
-
-
-def flags_of(command, *words):
-    said = io.StringIO()
-    with contextlib.redirect_stdout(said), pytest.raises(SystemExit):
-        importlib.import_module(command).main([*words, "--help"])
-    return flags_in(said.getvalue())
-
-
-def flags_of_tasks():
-    said = io.StringIO()
-    with contextlib.redirect_stdout(said), pytest.raises(SystemExit):
-        parse(TaskOptions, ["--help"])
-    return flags_in(said.getvalue())
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_takes_every_flag_of_a_task_with_the_same_values(command, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "90")  # one column
-    task = flags_of_tasks()
-    assert {"--settings", "--world", "--split", "--starts", "--extra-kinds", "--robot.reach-m"} <= set(task)
-    words = ["--pretrained", "room"] if command == "training.evaluate" else []
-    flags = flags_of(command, *words)
-    assert {name: flags.get(name) for name in task} == task
-    assert {"--robots"} <= set(flags)
-
-
-def test_a_replay_takes_what_a_record_leaves_open(monkeypatch):
+def test_a_replay_takes_what_a_record_leaves_open():
     """A record holds its scenario: where the world's file lies now, and how much reading it may take."""
-    monkeypatch.setenv("COLUMNS", "90")  # one column
-    task, flags = flags_of_tasks(), flags_of("baselines.replay")
-    assert set(task) & set(flags) == {"--world", "--read-memory-mib"}
+    assert set(TASK) & set(flags_of("baselines.replay")) == {"--world", "--read-memory-mib"}
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        *((f"baselines.{name}", []) for name in ("run", "benchmark", "episodes", "replay", "films")),
+        *((f"training.{name}", []) for name in ("ppo", "evaluate", "search")),
+    ],
+)
+def test_the_help_of_a_command_fits_a_screen_and_names_what_there_is(command, words, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    module = importlib.import_module(command)
+    with pytest.raises(SystemExit):
+        module.main([*words, "--help"])
+    said = capsys.readouterr().out
+    assert len(said.splitlines()) <= 70 and "\n\n\n" not in said
+    names = {option.name for option in options_of(module.Args, module.Args())}
+    assert set(getattr(module.Args, "usual", ())) <= names

@@ -11,7 +11,7 @@ import pytest
 from benchmarks.proofs.world_samples import heights, npz, pgm, sketch
 from entropy_explore_env.command import run_command
 from entropy_explore_env.settings.scenarios import SCENARIOS
-from entropy_explore_env.worlds.__main__ import main
+from entropy_explore_env.worlds.commands import main
 from entropy_explore_env.worlds.formats import FORMATS
 from entropy_explore_env.worlds.load import load_world, make_world
 
@@ -120,7 +120,7 @@ def test_bad_input_is_one_line(floor, tmp_path, monkeypatch, capsys, words):
 @pytest.mark.parametrize(
     ("words", "meant"),
     [
-        (["shw", "office", "--out", "world.png"], "did you mean show?"),
+        (["shw", "office", "--out", "world.png"], "'list', 'show', 'convert'"),
         (["show", "office", "--out", "world.png", "--split", "tests"], "did you mean test?"),
     ],
 )
@@ -130,7 +130,7 @@ def test_what_is_nearly_right_is_answered_with_the_right_word(words, meant, caps
 
 
 def test_as_a_process(tmp_path):
-    words = [sys.executable, "-m", "entropy_explore_env.worlds", "show", "nowhere.obj", "--out", "w.png"]
+    words = [sys.executable, "-m", "entropy_explore_env", "worlds", "show", "nowhere.obj", "--out", "w.png"]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("error: world file") and "Traceback" not in done.stderr

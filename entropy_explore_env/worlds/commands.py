@@ -1,4 +1,4 @@
-"""List, draw and convert worlds: `python -m entropy_explore_env.worlds list | show | convert`.
+"""List, draw and convert worlds: `python -m entropy_explore_env worlds list | show | convert`.
 
     list [FOLDER]                      scenarios and names, or the files of a folder that can be read
     show NAME_OR_FILE --out world.png  a picture with metres, and where robots may start
@@ -11,13 +11,12 @@ interrupted.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from entropy_explore_env.command import LineParser, run_command
+from entropy_explore_env.command import LineParser
 from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.randomness import Stream, check_seed, generator
 from entropy_explore_env.settings.changes import with_settings
@@ -83,7 +82,7 @@ def main(words: Sequence[str]) -> int:
 def _parser() -> argparse.ArgumentParser:
     kind = argparse.RawDescriptionHelpFormatter
     parser = LineParser(
-        prog="python -m entropy_explore_env.worlds", description=__doc__, formatter_class=kind
+        prog="python -m entropy_explore_env worlds", description=__doc__, formatter_class=kind
     )
     commands = parser.add_subparsers(dest="command", required=True)
     listing = commands.add_parser("list", help="recipes, names and files")
@@ -187,12 +186,3 @@ def _starts(world: World, source: str) -> tuple[np.ndarray | None, str]:
     starts.reshape(-1)[layout.starts] = True
     share = float(starts.sum() / (~world.occupied).sum())
     return starts, f"robots of {name} may start in {share:.1%} of the free voxels"
-
-
-def command() -> int:
-    """The command as a program of its own."""
-    return run_command(main)
-
-
-if __name__ == "__main__":
-    sys.exit(command())
