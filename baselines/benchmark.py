@@ -155,7 +155,7 @@ def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
         suite_strategies(args.suite)  # refuses an unknown suite first
         for name in given_in(words):
             if name in _PINNED or is_of_task(name):
-                raise SettingError(name, "given", "left out together with --suite, which pins it")
+                raise SettingError(name, "given", "no value beside --suite, which pins it")
         return find_suite(args.suite, args.quick, chosen_strategies(args.strategies, args.suite)), []
     if args.world_scenario is not None and args.world_scenario not in SCENARIOS:
         raise SettingError("world_scenario", args.world_scenario, one_of(args.world_scenario, SCENARIOS))
@@ -163,7 +163,7 @@ def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
     robots, names, refused = args.robots or default_sizes(args.task, args.quick), args.scenarios, []
     if is_whole_scenario(args.task.settings):
         if names is not None:
-            raise SettingError("scenarios", names, "left out: --settings holds a scenario of its own")
+            raise SettingError("scenarios", names, "no value: --settings holds a scenario of its own")
         tasks = scenario_tasks(None, args.task, words, robots, missions)
     elif args.task.world and names is None:
         tasks, refused = world_tasks(args.world_scenario, args.task, words, robots, missions)

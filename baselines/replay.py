@@ -91,7 +91,7 @@ def _refuse_settings(words: Sequence[str]) -> None:
         if name in _OWN or not (option.startswith("--") and refused):
             continue
         given = value or (None if following.startswith("--") else following)
-        raise SettingError(name, given, "left out: a record holds its settings, and runs again with them")
+        raise SettingError(name, given, "no value: a record holds its settings")
 
 
 def _replayed(

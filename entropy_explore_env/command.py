@@ -118,7 +118,8 @@ def run_command(main: Callable[[Sequence[str]], int], words: Sequence[str] | Non
         sys.stdout = Path(os.devnull).open("w")
         return 0
     except OSError as error:
-        print(f"error: {error}", file=sys.stderr)
+        where = "" if error.filename is None else f"{error.filename}: "
+        print(f"error: {where}{error.strerror or error}", file=sys.stderr)
         return BAD_INPUT
     except MemoryError as error:
         print(f"error: not enough memory: {error}", file=sys.stderr)

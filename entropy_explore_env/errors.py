@@ -1,4 +1,4 @@
-"""The errors of the package: each names a field, its value and what is allowed."""
+"""The errors of the package: each names a field, its value and what is expected."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def did_you_mean(word: object, known: Iterable[str]) -> str:
 
 
 def one_of(value: object, known: Iterable[str]) -> str:
-    """What is allowed where a value has to be one of some names; ends with the name that is most like it."""
+    """Return what is expected of a value that has to be one of some names; ends with the likeliest."""
     names = list(known)
     return "one of " + ", ".join(names) + did_you_mean(value, names)
 
@@ -69,8 +69,8 @@ class SettingError(EntropyExploreError):
     """A setting is unknown, of the wrong kind or out of its range."""
 
     def __init__(self, field: str, value: object, allowed: str) -> None:
-        """Name the field, its value and what is allowed."""
-        super().__init__(f"{field} = {shown(value)}: allowed is {allowed}")
+        """Take the field, its value and what is expected of it."""
+        super().__init__(f"{field} = {shown(value)}: expected {allowed}")
         self.field, self.value, self.allowed = field, value, allowed
 
     def __reduce__(self) -> tuple[type, tuple[str, object, str]]:

@@ -24,6 +24,8 @@ def write_atomically(path: Path, content: bytes | str) -> None:
             os.fsync(file.fileno())
         Path(temporary).chmod(0o644)
         Path(temporary).replace(path)
-    except BaseException:
+    except BaseException as error:
         Path(temporary).unlink(missing_ok=True)
+        if isinstance(error, OSError):  # a full disk has no name, and nobody knows the temporary file's
+            raise OSError(error.errno, error.strerror, str(path)) from None
         raise

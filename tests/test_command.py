@@ -26,10 +26,10 @@ def run(request):
 @pytest.mark.parametrize(
     ("error", "code", "line"),
     [
-        (SettingError("speed", -1, "a number > 0"), BAD_INPUT, "error: speed = -1: allowed is a number > 0"),
-        (WorldError("world", "x", "another"), BAD_INPUT, "error: world = 'x': allowed is another"),
+        (SettingError("speed", -1, "a number > 0"), BAD_INPUT, "error: speed = -1: expected a number > 0"),
+        (WorldError("world", "x", "another"), BAD_INPUT, "error: world = 'x': expected another"),
         (CallOrderError("not\n  yet"), BAD_INPUT, "error: not yet"),
-        (FileNotFoundError(2, "No such file", "a.bt"), BAD_INPUT, "error: [Errno 2] No such file: 'a.bt'"),
+        (FileNotFoundError(2, "No such file", "a.bt"), BAD_INPUT, "error: a.bt: No such file"),
         (MemoryError("8 EiB"), BAD_INPUT, "error: not enough memory: 8 EiB"),
         (KeyboardInterrupt(), INTERRUPTED, "interrupted"),
     ],
@@ -84,7 +84,7 @@ def test_a_terminal_that_lacks_characters_gets_question_marks(run, monkeypatch):
         raise WorldError("maße", "Ω", "×")
 
     assert run(main, []) == BAD_INPUT
-    for stream, expected in ((out, b"? = 0.03 ?\n"), (err, b"error: ma?e = '?': allowed is ?\n")):
+    for stream, expected in ((out, b"? = 0.03 ?\n"), (err, b"error: ma?e = '?': expected ?\n")):
         stream.flush()
         assert stream.buffer.getvalue() == expected
 

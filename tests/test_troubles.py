@@ -74,7 +74,7 @@ def test_a_sweep_on_a_full_disk_says_so_and_goes_on_later(undisturbed, tmp_path,
 def test_a_folder_that_cannot_be_written_is_refused_by_name_before_a_mission_runs(capsys):
     assert run_command(benchmark.main, [*SWEEP, str(UNWRITABLE)]) == 2
     said = capsys.readouterr()
-    assert said.err.startswith("error: out = '/proc/nowhere': allowed is a folder") and said.out == ""
+    assert said.err.startswith("error: out = '/proc/nowhere': expected a folder") and said.out == ""
 
 
 def test_a_checkpoint_on_a_full_disk_leaves_the_one_before(tmp_path):

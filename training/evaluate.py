@@ -83,7 +83,7 @@ def main(words: Sequence[str]) -> int:
     args = parse(Args, words, description=__doc__)
     if (args.pretrained is None) == (args.strategy is None):
         parse(Args, words, description=__doc__)  # the help, if it is asked for
-        raise SettingError("strategy", args.strategy, "given, or else --pretrained, not both")
+        raise SettingError("strategy", args.strategy, "either --strategy or --pretrained")
     check_whole("seeds", args.seeds, 1)
     workers = args.workers
     policy = args.strategy if args.pretrained is None else PREFIX + args.pretrained
@@ -91,7 +91,7 @@ def main(words: Sequence[str]) -> int:
     trained = trained_in(policy)
     base = base_task(evaluation_scenario(trained, args.scenario, args.robots), args.task.settings)
     if args.scenario is not None and is_whole_scenario(args.task.settings):
-        raise SettingError("scenario", args.scenario, "left out: --settings holds a scenario of its own")
+        raise SettingError("scenario", args.scenario, "no value: --settings holds a scenario of its own")
     base = base._replace(scenario=with_settings(base.scenario, {"split": "test"}))
     args = parsed_for(base, args, words)
     elsewhere = args.scenario or args.task.settings or args.task.world

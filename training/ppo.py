@@ -217,14 +217,14 @@ def check(args: Args) -> None:
     for name in ("threads", "rollout_steps"):
         check_whole(name, getattr(args, name), 1)
     if args.patch and args.features != "maps":
-        raise SettingError("patch", args.patch, "used with --features maps, whose networks read it")
+        raise SettingError("patch", args.patch, "--features maps beside it, whose networks read it")
     if args.target_kl is not None and not 0.0 < args.target_kl < np.inf:
         raise SettingError("target_kl", args.target_kl, "a number above 0")
     check_whole("critic_first", args.critic_first, 0)
     _check_candidates(args)
     own = base_task(args.scenario, args.task.settings, OWN).scenario.reward.cost_per_s  # as a run keeps it
     if args.reward == "seconds" and args.cost_per_s not in (None, own):
-        raise SettingError("cost_per_s", args.cost_per_s, "left out with --reward seconds")
+        raise SettingError("cost_per_s", args.cost_per_s, "no value beside --reward seconds")
 
 
 _WITHOUT_CANDIDATES = ("features", "overview", "patch", "hidden", "yaws", "pitches")
@@ -238,7 +238,7 @@ def _check_candidates(args: Args) -> None:
     defaults = Args()
     for name in ignored:
         if getattr(args, name) != getattr(defaults, name):
-            raise SettingError(name, getattr(args, name), f"left out {word} --actions candidates")
+            raise SettingError(name, getattr(args, name), f"no value {word} --actions candidates")
     if args.over_candidates:
         check_width(args.width)
         check_attention_layers(args.attention_layers)

@@ -166,7 +166,7 @@ def resumed_options(
     started.out = started.resume = folder
     args = parse(kind, words, default=started, description=description)
     if args.out is not None and args.out.absolute() != folder.absolute():
-        raise SettingError("out", str(args.out), "not given with --resume, which names the folder")
+        raise SettingError("out", str(args.out), "no value beside --resume, which names the folder")
     args = settle(args)
     args.out, changed = folder, {}
     was, now = _flat(options_json(started)), _flat(options_json(args))

@@ -176,7 +176,7 @@ class Results:
             raise SettingError("out", str(file), "lines of JSON that training.search wrote") from None
         for name, value in json.loads(json.dumps(origin)).items():
             if not isinstance(head, dict) or head.get(name) != value:
-                allowed = f"as in the search whose results {file} holds; else another folder --out"
+                allowed = f"the value of the search whose results {file} holds, or another folder --out"
                 raise SettingError(name, value, allowed)
         self.known: dict[str, list[float]] = dict(self._checked(row) for row in rows)
         if torn:

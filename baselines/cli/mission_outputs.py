@@ -71,7 +71,7 @@ class Wanted:
             MissingExtraError: A package is not installed.
         """
         if self.outputs.truth and self.out is None:
-            raise SettingError("truth", True, "given together with --out")
+            raise SettingError("truth", True, "--out beside it")
         mp4, rerun = self.outputs.mp4, self.outputs.rerun
         for package, module, file in (("av", "av", mp4), ("rerun-sdk", "rerun", rerun)):
             if file is not None and importlib.util.find_spec(module) is None:

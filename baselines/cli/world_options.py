@@ -73,7 +73,7 @@ def world_settings(worlds: Sequence[str], voxel_size_m: float | None, reading: R
     size = {} if voxel_size_m is None else {"voxel_size_m": voxel_size_m}
     if not worlds:
         for name, value in (size | reading.asked()).items():
-            raise SettingError(name, value, "given together with --world only")
+            raise SettingError(name, value, "--world beside it")
         return {}
     if len(worlds) > 1 or reading.asked():
         path = worlds[0] if len(worlds) == 1 else list(worlds)

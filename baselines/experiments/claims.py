@@ -104,7 +104,7 @@ def _group_of(claim: Claim, groups: Mapping[str, str]) -> str:
     """Return the beginning of the id that names the group of a claim."""
     starts = [start for start in groups if claim.id.startswith(start)]
     if not starts:
-        raise SettingError("claim", claim.id, f"in a group: {', '.join(groups)}")
+        raise SettingError("claim", claim.id, f"one in a group: {', '.join(groups)}")
     return max(starts, key=len)
 
 

@@ -102,7 +102,7 @@ class Experiment:
             SettingError: There are too few seeds, or world files that the experiment does not take.
         """
         if worlds and not self.takes_worlds:
-            raise SettingError("worlds", " ".join(map(str, worlds)), f"left out: {self.name} takes none")
+            raise SettingError("worlds", " ".join(map(str, worlds)), f"no value: {self.name} takes none")
         for file in worlds:
             if not file.is_file():
                 raise SettingError("worlds", str(file), "files of worlds")

@@ -92,7 +92,7 @@ def join(ray: Any, option: str, address: str) -> None:  # noqa: ANN401 - the mod
     Raises:
         SettingError: No cluster answers there.
     """
-    no_answer = SettingError(option, address, "that of a Ray cluster that answers")
+    no_answer = SettingError(option, address, "the address of a Ray cluster that answers")
     if address != AUTO:  # `ray.init` would try for many minutes
         health_check = [sys.executable, "-m", "ray.scripts.scripts", "health-check", "--address", address]
         try:

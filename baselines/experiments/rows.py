@@ -159,9 +159,9 @@ class GrowingTable:
             while rest:
                 rest = rest[os.write(descriptor, rest) :]
             os.fsync(descriptor)
-        except OSError:
+        except OSError as error:
             os.ftruncate(descriptor, before)
-            raise
+            raise OSError(error.errno, error.strerror, str(self._path)) from None
         finally:
             os.close(descriptor)
 

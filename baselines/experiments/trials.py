@@ -97,7 +97,7 @@ class How:
     def __post_init__(self) -> None:
         """Check what contradicts itself."""
         if self.rerun and self.since is not None:
-            raise SettingError("since", self.since, "left out together with --rerun, which runs all again")
+            raise SettingError("since", self.since, "no value beside --rerun, which runs all again")
 
 
 def run_trials(trials: Sequence[Trial], table: Path, how: How, known: Sequence[Row] = ()) -> list[Row | None]:

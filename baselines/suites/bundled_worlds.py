@@ -38,7 +38,7 @@ def dungeons() -> list[Dungeon]:
     """
     starts = WORLDS / "starts.csv"
     if not starts.is_file():
-        raise SettingError("suite world", str(starts), "there: it comes with the project")
+        raise SettingError("suite world", str(starts), "a file that is there: it comes with the project")
     with starts.open(newline="") as file:
         rows = list(csv.DictReader(file))
     return [
@@ -70,7 +70,7 @@ def world_file(name: str) -> str:
     """
     path = WORLDS / f"{name}.npz"
     if not path.is_file():
-        raise SettingError("suite world", str(path), "there: it comes with the project")
+        raise SettingError("suite world", str(path), "a file that is there: it comes with the project")
     return str(path)
 
 

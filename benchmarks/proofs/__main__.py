@@ -112,7 +112,7 @@ def checked(args: Args) -> Args:
     if args.cases is not None:
         check_whole("cases", args.cases, 1)
         if args.full:
-            raise SettingError("cases", args.cases, "given without --full")
+            raise SettingError("cases", args.cases, "no value beside --full")
     check_whole("first", args.first, 0)
     if not args.limit_s > 0.0:
         raise SettingError("limit_s", args.limit_s, "a number > 0")

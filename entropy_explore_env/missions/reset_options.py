@@ -68,7 +68,7 @@ def named_options(
         raise SettingError("options", options, "a dict, or None")
     for name, value in options.items():
         if name not in allowed and not (name in ignored and value is ignored[name]):
-            known = "nothing but " + ", ".join(allowed)
+            known = "only " + ", ".join(allowed)
             raise SettingError("options", name, known + did_you_mean(name, allowed))
     return dict(options)
 

@@ -129,7 +129,7 @@ def _part(kind: type, value: Any, name: str) -> Any:  # noqa: ANN401 - an object
     for field in dataclasses.fields(kind):
         needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
         if needed and field.name not in value:
-            raise SettingError(f"{kind.__name__}.{field.name}", "missing", "given")
+            raise SettingError(f"{kind.__name__}.{field.name}", "missing", "a value")
     return kind(
         **{field: _decoded(hints[field], given, f"{kind.__name__}.{field}") for field, given in value.items()}
     )

@@ -116,13 +116,13 @@ class Scenario:
         self._check_broadcasts()
         self._check_faults()
         self._check_fiducials()
-        allowed = f"so short that at most {MAX_MESSAGES} messages are under way at once"
+        allowed = f"a time so short that at most {MAX_MESSAGES} messages are under way at once"
         name, longest_s = ("Channel.delay_s", self.channel.delay_s)
         if self.faults.radio.late > 0.0 and self.faults.radio.late_s > self.channel.delay_s:
             name, longest_s = ("RadioFault.late_s", self.faults.radio.late_s)
         if self.message_slots > MAX_MESSAGES:
             raise SettingError(name, longest_s, allowed)
-        allowed = f"so short that at most {MAX_IN_FLIGHT} measurements are under way at once"
+        allowed = f"a time so short that at most {MAX_IN_FLIGHT} measurements are under way at once"
         if self.message_slots * max(self.batch_measurements, 1) > MAX_IN_FLIGHT:
             raise SettingError(name, longest_s, allowed)
         if 2 * self.robots * self.phase_batches * max(self.batch_measurements, 1) > MAX_IN_FLIGHT:
@@ -141,9 +141,7 @@ class Scenario:
             moves = math.prod(2 * min(steps, n - 1) + 1 for n in axes)
             actions = moves * self.action.yaws * self.action.pitches
             if actions > MAX_ACTIONS:
-                allowed = (
-                    f"so short that there are at most {MAX_ACTIONS:,} discrete actions (not {actions:,}), "
-                )
+                allowed = f"a reach with at most {MAX_ACTIONS:,} discrete actions (not {actions:,}), "
                 allowed += "or moves along the axes alone: Action.moves = 'axes'"
                 raise SettingError("Robot.reach_m", robot.reach_m, allowed)
         layer = self.layer_of(robot)

@@ -139,13 +139,13 @@ def _world(args: argparse.Namespace) -> World:
         given["fill"] = False
     given |= {"negate": args.negate, "inside": args.inside}
     if args.source not in SCENARIOS:
-        _refuse(args, _OF_SCENARIOS, "not given for a file")
+        _refuse(args, _OF_SCENARIOS, "no value for a file")
         if not Path(args.source).suffix and args.source != JACKSBORO:
             raise SettingError("source", args.source, f"a world file, or {one_of(args.source, SCENARIOS)}")
         return load_world(args.source, **given)
     for name, value in given.items():
         if value is not None:
-            raise SettingError(name, value, "not given for a scenario")
+            raise SettingError(name, value, "no value for a scenario")
     return _world_of_scenario(SCENARIOS[args.source], args)
 
 
@@ -154,7 +154,7 @@ def _world_of_scenario(scenario: Scenario, args: argparse.Namespace) -> World:
     if args.world_number is None:
         scenario = with_settings(scenario, {"split": args.split or "train"})
         return make_world(scenario, generator(check_seed(args.seed or 0), 0, Stream.WORLD))
-    _refuse(args, ("seed", "split"), "left out together with --world-number, which names the world")
+    _refuse(args, ("seed", "split"), "no value beside --world-number, which names the world")
     if not is_whole(args.world_number, 0):
         raise SettingError("world_number", args.world_number, "a whole number ≥ 0")
     return make_world(scenario, args.world_number)

@@ -56,7 +56,7 @@ def with_given_worlds(scenario: Scenario, settings: Mapping[str, Any]) -> tuple[
     given = tuple(_without_margins(each) for each in given) if len(given) == 1 else given
     grid = given[0].grid
     if settings.get("grid", grid) != grid:
-        raise SettingError("Scenario.grid", settings["grid"], "not given: the world brings its own")
+        raise SettingError("Scenario.grid", settings["grid"], "no value: the world brings its own")
     return with_settings(scenario, {**settings, "world": GIVEN, "grid": grid}), given
 
 

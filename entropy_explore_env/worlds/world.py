@@ -221,12 +221,15 @@ class World:
             fits[:, :, :layer] = fits[:, :, layer + 1 :] = False
         starts = largest_component(fits)
         if not starts.any():
-            allowed = f"a world with room for a body of radius {body_radius_m} m"
+            expected, cures = f"room for a body with a radius of {body_radius_m} m", "--robot.body-radius-m"
             if layer is not None and not self.grid.flat:
-                allowed += f" in layer {layer}, where planar robots stay"
+                height_m = (layer + 0.5) * self.grid.voxel_size_m
+                expected += f" at the height of the sensor, {height_m:.3g} m"
+                cures += ", --robot.sensor-height-m"
             if ground_layer is not None:
-                allowed += f", above ground in layer {ground_layer}"
-            raise WorldError("world", self.name, allowed)
+                expected += ", with ground below it"
+                cures += ", --robot.above-ground-m"
+            raise WorldError("world", self.name, f"{expected}; see {cures} and --voxel-size-m")
         labels, _ = connected_components(~self.occupied)
         visible = np.isin(labels, np.unique(labels[starts]))
         if voxels_behind:

@@ -150,7 +150,7 @@ def test_a_world_file_that_changed_is_refused_and_one_that_moved_is_found(comman
 def test_what_a_record_holds_is_refused_by_name(words, said, command, tmp_path):
     ran = command(replay.main, tmp_path / "r.npz", *words)
     assert (ran.code, ran.out) == (2, "")
-    assert ran.err.startswith(f"error: {said}: allowed is left out: a record holds its settings")
+    assert ran.err.startswith(f"error: {said}: expected no value: a record holds its settings")
 
 
 def forget_worlds() -> None:

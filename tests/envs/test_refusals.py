@@ -109,12 +109,12 @@ def test_only_what_checkers_send_may_be_given_for_nothing(value: Any) -> None:
     if value == 1 and value is not True:
         team.reset(seed=0, options={"options": value})
         return
-    with pytest.raises(SettingError, match="options = 'options': allowed is nothing but starts, world"):
+    with pytest.raises(SettingError, match="options = 'options': expected only starts, world"):
         team.reset(seed=0, options={"options": value})
 
 
 def test_values_that_cannot_be_shown_are_refused_all_the_same() -> None:
-    with pytest.raises(SettingError, match=r"Scenario.robots = <int>: allowed is a whole number"):
+    with pytest.raises(SettingError, match=r"Scenario.robots = <int>: expected a whole number"):
         parallel_env(BOX, robots=10**5000)
 
 

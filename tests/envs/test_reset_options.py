@@ -178,7 +178,7 @@ def with_size(shape: tuple[int, int, int]) -> World:
 
 REFUSED: list[tuple[Any, str]] = [
     ({"start": STARTS}, "start.*did you mean starts"),
-    ({"wings": 2}, "wings.*nothing but starts, world"),
+    ({"wings": 2}, "wings.*only starts, world"),
     ([], "a dict, or None"),
     ({"starts": STARTS[:1]}, r"starts.*shape \(2, 5\)"),
     ({"starts": STARTS[:, :3]}, r"shape \(2, 5\)"),
@@ -221,7 +221,7 @@ def test_what_cannot_be_is_refused_by_name_and_changes_nothing(options: Any, sai
         ({"starts": np.stack([STARTS, changed(1, 1, 0.9)])}, "robot_0"),
         ({"world": [3]}, "one world, or 2 of them"),
         ({"world": [3, -3]}, "world = -3"),
-        ({"options": 1}, "nothing but reset_mask, starts, world"),
+        ({"options": 1}, "only reset_mask, starts, world"),
     ],
 )
 def test_vector_environments_refuse_it_too_for_all_missions_or_none(options: Any, said: str) -> None:

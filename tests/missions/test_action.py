@@ -237,7 +237,7 @@ def test_a_viewpoint_beyond_reach_by_more_than_rounding_is_pulled_in():
 @pytest.mark.parametrize("kind", ["continuous", "discrete"])
 def test_a_viewpoint_that_is_none_is_refused(viewpoint, kind):
     rules = rules_of(free_box(action={"kind": kind}))
-    with pytest.raises(ActionError, match=r"viewpoint = .*: allowed is five finite numbers"):
+    with pytest.raises(ActionError, match=r"viewpoint = .*: expected five finite numbers"):
         encode_viewpoint(rules, np.zeros(5), viewpoint)
 
 

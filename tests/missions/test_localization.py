@@ -348,7 +348,7 @@ def test_drawn_fiducials_are_on_surfaces_that_robots_can_see(seed, world):
 
 def test_fiducials_where_none_can_be_are_refused_before_anything_changes():
     with pytest.raises(
-        SettingError, match=r"Fiducials.positions_m = \(1.0, 6.0, 1.0\): allowed is places from"
+        SettingError, match=r"Fiducials.positions_m = \(1.0, 6.0, 1.0\): expected places from"
     ):
         free_box(fiducials={"positions_m": ((1.0, 6.0, 1.0),)})
     occupied = np.zeros((7, 11, 5), bool)
@@ -358,14 +358,14 @@ def test_fiducials_where_none_can_be_are_refused_before_anything_changes():
         inside = free_box(fiducials={"positions_m": ((1.0, 1.0, 1.0), (1.75, 2.25, 1.25))}, **drifting)
         env = EntropyExploreEnv(inside, world=box)
         with pytest.raises(
-            WorldError, match=r"Fiducials.positions_m = \(1.75, 2.25, 1.25\): allowed is a place in free"
+            WorldError, match=r"Fiducials.positions_m = \(1.75, 2.25, 1.25\): expected a place in free"
         ):
             env.reset(seed=0)
     many = started(free_box(fiducials={"number": 200}, **DRIFTING))
     before = state_digest(many, 0)
     many.rules = many.rules._replace()  # a reset that cannot be done leaves all as it was
     object.__setattr__(many.scenario.fiducials, "number", 900)
-    with pytest.raises(WorldError, match=r"Fiducials.number = 900: allowed is at most 250"):
+    with pytest.raises(WorldError, match=r"Fiducials.number = 900: expected at most 250"):
         many.reset(0, 1)
     object.__setattr__(many.scenario.fiducials, "number", 200)
     assert state_digest(many, 0) == before
@@ -395,7 +395,7 @@ def test_other_settings_are_refused_by_name(kind, field, value):
     with pytest.raises(SettingError) as raised:
         kind(**{field: value})
     assert str(raised.value).startswith(f"{kind.__name__}.{field} = ")
-    with pytest.raises(SettingError, match=r"Fiducials.number = 2: allowed is 0 where positions_m"):
+    with pytest.raises(SettingError, match=r"Fiducials.number = 2: expected 0 where positions_m"):
         Fiducials(number=2, positions_m=((0.0, 0.0, 0.0),))
 
 

@@ -454,14 +454,14 @@ def test_robots_start_near_the_first_one_where_the_scenario_says_so():
         places = near.state.robots[0]["goal"][:, :3]
         assert np.linalg.norm(places - places[0], axis=1).max() <= 0.8
         assert (near.state.robots[0]["goal"][0] == anywhere.state.robots[0]["goal"][0]).all()
-    with pytest.raises(WorldError, match=r"Scenario\.robots = 4: allowed is at most"):
+    with pytest.raises(WorldError, match=r"Scenario\.robots = 4: expected at most"):
         started(free_box(robots=4, start_radius_m=0.3, robot={"body_radius_m": 0.2}))
 
 
 def test_more_robots_than_there_is_room_for_are_refused_before_anything_changes():
     crowd = free_box(robots=60, robot={"body_radius_m": 0.6}, observation=NO_PARTS)
     missions = Missions(crowd)
-    with pytest.raises(WorldError, match=r"Scenario\.robots = 60: allowed is at most"):
+    with pytest.raises(WorldError, match=r"Scenario\.robots = 60: expected at most"):
         missions.reset(0, 1)
     assert missions.worlds == [None]
     assert not missions.state.precision.any()
@@ -523,9 +523,9 @@ def test_steps_before_a_reset_and_counts_that_are_none():
     with pytest.raises(CallOrderError, match="step before reset"):
         wander(Missions(free_box()), 1, 0)
     for count in (0, -1, 1.5, True, "2"):
-        with pytest.raises(SettingError, match=r"missions = .*: allowed is a whole number ≥ 1"):
+        with pytest.raises(SettingError, match=r"missions = .*: expected a whole number ≥ 1"):
             Missions(free_box(), count)
-        with pytest.raises(SettingError, match=r"threads = .*: allowed is a whole number ≥ 1"):
+        with pytest.raises(SettingError, match=r"threads = .*: expected a whole number ≥ 1"):
             Missions(free_box(), 1, count)
 
 

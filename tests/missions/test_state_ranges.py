@@ -156,7 +156,7 @@ def test_starts_and_worlds_that_cannot_be_are_refused_and_change_nothing():
         ("world_1", np.zeros(100, np.uint8)),
         ("world_1", np.zeros(0, np.uint8)),
     ):
-        with pytest.raises(EntropyExploreError, match="allowed is"):
+        with pytest.raises(EntropyExploreError, match="expected"):
             restore(missions, {**arrays, name: value})
         assert everything(missions)[:4] == before
     with pytest.raises(RecordError):

@@ -90,7 +90,7 @@ def test_generators_repeat_by_seed_and_episode():
 def test_a_seed_that_is_no_whole_number_is_refused(seed):
     with pytest.raises(SettingError) as raised:
         check_seed(seed)
-    assert str(raised.value) == f"seed = {seed!r}: allowed is a whole number ≥ 0, or None"
+    assert str(raised.value) == f"seed = {seed!r}: expected a whole number ≥ 0, or None"
 
 
 def test_seeds():

@@ -91,7 +91,7 @@ def test_a_file_of_weights_is_a_strategy(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "named"),
     [
-        ({"features_version": 1}, "features_version = 1: allowed is 2: these weights are of other features"),
+        ({"features_version": 1}, "features_version = 1: expected 2: these weights are of other features"),
         ({"features_version": True}, "features_version = True"),
         ({"weights": {"second": 1.0}}, r"weights = 'second': .*did you mean seconds\?"),
         ({"weights": {"seconds": "much"}}, "weights: seconds = 'much'"),

@@ -445,7 +445,7 @@ def test_an_ellipse_of_two_standard_deviations_is_drawn_around_an_estimate(up: i
     row, column = pixel_of(view, place)
     assert not changed[row, column]
     with pytest.raises(
-        SettingError, match=r"Frame.covariances_m2 = \(2, 3, 3\): allowed is a shape \(1, 3, 3\)"
+        SettingError, match=r"Frame.covariances_m2 = \(2, 3, 3\): expected a shape \(1, 3, 3\)"
     ):
         dataclasses.replace(frame, covariances_m2=np.zeros((2, 3, 3)))
 
@@ -475,7 +475,7 @@ def test_fiducials_are_light_triangles_in_every_map() -> None:
         row, column = pixel_of(view, place)
         assert tuple(after[row, column]) == PAPER != tuple(before[row, column])
         assert INK in map(tuple, part_around(after, row, column, 8).reshape(-1, 3))
-    with pytest.raises(SettingError, match=r"Frame.fiducials_m = \(2, 2\): allowed is a shape \(2, 3\)"):
+    with pytest.raises(SettingError, match=r"Frame.fiducials_m = \(2, 2\): expected a shape \(2, 3\)"):
         dataclasses.replace(frame, fiducials_m=np.zeros((2, 2)))
 
 

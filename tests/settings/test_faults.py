@@ -50,18 +50,16 @@ def test_other_values_are_refused_by_name(kind, field, value):
 @pytest.mark.parametrize("part", ["stop", "blind", "silent", "sensor", "radio"])
 def test_faults_are_those_of_robots_that_there_are(part):
     assert with_settings(TEAM, {"faults": {part: {"robots": (2, 0)}}}).faults.parts[part].robots == (2, 0)
-    with pytest.raises(
-        SettingError, match=r"robots = \(3,\): allowed is numbers of robots of the team, .* 3"
-    ):
+    with pytest.raises(SettingError, match=r"robots = \(3,\): expected numbers of robots of the team, .* 3"):
         with_settings(TEAM, {"faults": {part: {"robots": (3,)}}})
 
 
 def test_late_messages_and_phases_do_not_go_together():
     late = {"faults": {"radio": {"late": 0.1}}}
     assert with_settings(TEAM, late).message_slots > 0 == TEAM.message_slots
-    with pytest.raises(SettingError, match=r"RadioFault.late = 0.1: allowed is 0 where batches"):
+    with pytest.raises(SettingError, match=r"RadioFault.late = 0.1: expected 0 where batches"):
         with_settings(TEAM, {**late, "channel": {"phase_s": 2.0}})
-    with pytest.raises(SettingError, match=r"RadioFault.late_s = 3600.0: allowed is so short"):
+    with pytest.raises(SettingError, match=r"RadioFault.late_s = 3600.0: expected a time so short"):
         with_settings(TEAM, {"faults": {"radio": {"late": 0.1, "late_s": 3600.0}}, "robots": 40})
 
 

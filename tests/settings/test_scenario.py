@@ -181,7 +181,7 @@ def refusal(call):
     error = raised.value
     assert isinstance(error, EntropyExploreError)
     assert isinstance(error, ValueError)
-    assert str(error) == f"{error.field} = {error.value!r}: allowed is {error.allowed}"
+    assert str(error) == f"{error.field} = {error.value!r}: expected {error.allowed}"
     assert error.allowed
     assert "\n" not in str(error)
     return error

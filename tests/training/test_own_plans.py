@@ -71,7 +71,7 @@ def test_a_policy_learns_in_plans_and_is_tested_in_others(plans, tmp_path, capsy
     assert len(missions) == 4 and {mission.record["world"] for mission in missions} == {"test"}
     plans["a/plan"].write_bytes(plans["b/plan"].read_bytes())
     assert run_command(ppo.main, ["--resume", str(run), "--total-steps", "64"]) == BAD_INPUT
-    assert f"error: world = '{plans['a/plan']}': allowed is the file that" in capsys.readouterr().err
+    assert f"error: world = '{plans['a/plan']}': expected the file that" in capsys.readouterr().err
 
 
 def test_a_policy_that_observes_the_whole_map_is_validated_in_plans_of_its_size(plans, tmp_path, capsys):

@@ -259,9 +259,9 @@ def test_a_run_is_neither_overwritten_nor_continued_with_other_options(uninterru
     assert learn(out) == BAD_INPUT
     assert f"--resume {out} continues the run" in capsys.readouterr().err
     for words, said in (
-        (["--gamma", "0.5"], "error: gamma = 0.5: allowed is 0.9, as in the run"),
-        (["--channel.burst", "3"], "error: channel.burst = 3: allowed is 8, as in the run"),
-        (["--scenario", "room"], "error: scenario = 'room': allowed is box-7x11x5, as in the run"),
+        (["--gamma", "0.5"], "error: gamma = 0.5: expected 0.9, as in the run"),
+        (["--channel.burst", "3"], "error: channel.burst = 3: expected 8, as in the run"),
+        (["--scenario", "room"], "error: scenario = 'room': expected box-7x11x5, as in the run"),
         (["--out", str(tmp_path)], "error: out = "),
     ):
         assert resume(out, *words) == BAD_INPUT

@@ -128,7 +128,7 @@ def test_weights_of_other_networks_are_refused(trained, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("changes", "named"),
     [
-        ({"features_version": FEATURES_VERSION + 1}, "features_version = 3: allowed is 2: its features"),
+        ({"features_version": FEATURES_VERSION + 1}, "features_version = 3: expected 2: its features"),
         ({"features_version": None}, "features_version = None"),
         ({"candidate_features": ["score", "beauty"]}, "candidate_features = 'beauty'"),
         ({"candidate_features": list(COLUMNS)}, "candidate_features = 'context: entropy'"),
@@ -136,7 +136,7 @@ def test_weights_of_other_networks_are_refused(trained, tmp_path, capsys):
         ({"candidate_features": 3}, "candidate_features = 'score'"),
         (
             {"observation": {"candidates": [5, 99]}},
-            rf"observation candidates = \[5, 99\]: allowed is \[5, {len(COLUMNS)}\]",
+            rf"observation candidates = \[5, 99\]: expected \[5, {len(COLUMNS)}\]",
         ),
         ({"observation": "all"}, "observation candidates = None"),
         ({"scenario": {"robots": 0}}, "scenario"),
@@ -189,7 +189,7 @@ def test_options_that_would_be_ignored_are_refused(words, name, tmp_path, capsys
     out = tmp_path / "run"
     assert ppo.run_command(ppo.main, [*PLAIN, *words.split(), "--out", str(out)]) == BAD_INPUT
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.partition(" = ")[0].endswith(name) and "left out with" in line and not out.exists()
+    assert line.partition(" = ")[0].endswith(name) and "expected no value with" in line and not out.exists()
 
 
 def test_options_that_are_read_are_not_refused():

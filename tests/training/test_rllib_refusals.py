@@ -28,7 +28,7 @@ from training.validation import Validation
         ("--runners -1", "runners = -1"),
         ("--total-steps 0", "total_steps = 0"),
         ("--validation-missions 0", "validation_missions = 0"),
-        ("--minibatch 64 --batch 32", "minibatch = 64: allowed is at most the batch, 32"),
+        ("--minibatch 64 --batch 32", "minibatch = 64: expected at most the batch, 32"),
         ("--learning-rate nan", "learning_rate = nan"),
         ("--gamma 1.1", "gamma = 1.1"),
         ("--entropy -1", "entropy = -1"),
@@ -200,7 +200,7 @@ def test_an_interrupted_command_says_how_to_go_on(tmp_path, capsys, monkeypatch)
     assert run_command(main, ["--out", str(run)]) == 2
     assert f"--resume {run} continues" in capsys.readouterr().err
     assert run_command(main, ["--resume", str(run), "--robots", "3"]) == 2
-    assert "robots = 3: allowed is 2, as in the run" in capsys.readouterr().err
+    assert "robots = 3: expected 2, as in the run" in capsys.readouterr().err
     assert run_command(main, ["--resume", str(run), "--runners", "1"]) == INTERRUPTED
     assert f"{run}: goes on after 3 iterations; runners was 2\n" == capsys.readouterr().err
     (run / "checkpoint-000003").rmdir()

@@ -149,7 +149,7 @@ def test_broken_results_are_refused(line, whole, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("more", "named"),
     [
-        ("--sigma 2.0", "sigma = 2.0: allowed is as in the search"),
+        ("--sigma 2.0", "sigma = 2.0: expected the value of the search"),
         ("--pairs 4", "pairs = 4"),
         ("--tasks box-7x11x5:3", "tasks = "),
         ("--tasks box-7x11x5", "NAME:ROBOTS"),

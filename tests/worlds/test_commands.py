@@ -63,14 +63,14 @@ def test_a_world_of_a_number_is_that_of_make_world(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["office", "--world-number", "3", "--seed", "1"], "seed = 1: allowed is left out together with"),
-        (["office", "--world-number", "3", "--seed", "0"], "seed = 0: allowed is left out together with"),
+        (["office", "--world-number", "3", "--seed", "1"], "seed = 1: expected no value beside"),
+        (["office", "--world-number", "3", "--seed", "0"], "seed = 0: expected no value beside"),
         (
             ["office", "--world-number", "3", "--split", "test"],
-            "split = 'test': allowed is left out together with",
+            "split = 'test': expected no value beside",
         ),
-        (["office", "--world-number", "-3"], "world_number = -3: allowed is a whole number"),
-        (["FLOOR", "--world-number", "3"], "world_number = 3: allowed is not given for a file"),
+        (["office", "--world-number", "-3"], "world_number = -3: expected a whole number"),
+        (["FLOOR", "--world-number", "3"], "world_number = 3: expected no value for a file"),
     ],
 )
 def test_a_seed_and_a_number_exclude_each_other(floor, words, said, capsys):

@@ -85,7 +85,7 @@ def test_what_is_not_read_is_refused_with_what_converts_it(name, line):
     ],
 )
 def test_settings_out_of_range_are_refused_before_anything_is_read(setting, value):
-    with pytest.raises(SettingError, match=rf"{setting} = .*: allowed is (a number > 0|True or False)"):
+    with pytest.raises(SettingError, match=rf"{setting} = .*: expected (a number > 0|True or False)"):
         load_world("nowhere.png", **{setting: value})
 
 
@@ -96,7 +96,7 @@ def test_an_option_that_there_is_not_is_refused_with_the_one_that_is_like_it(loa
 
 
 def test_a_misspelt_height_is_a_named_error():
-    with pytest.raises(SettingError, match=r"heigth_m = 2: allowed is one of .*; did you mean height_m\?$"):
+    with pytest.raises(SettingError, match=r"heigth_m = 2: expected one of .*; did you mean height_m\?$"):
         load_world("nowhere.png", heigth_m=2)
 
 
@@ -108,13 +108,11 @@ def test_the_options_of_load_world_are_known_to_who_asks_for_its_signature():
 def test_settings_that_mean_nothing_for_a_file_are_refused(tmp_path):
     path = tmp_path / "plan.pgm"
     path.write_bytes(pgm(sketch()))
-    with pytest.raises(
-        SettingError, match=r"ceiling_m = 2\.0: allowed is None: it does not apply to PNG, PGM"
-    ):
+    with pytest.raises(SettingError, match=r"ceiling_m = 2\.0: expected None: it does not apply to PNG, PGM"):
         load_world(path, ceiling_m=2.0)
     hills = tmp_path / "hills.npz"
     hills.write_bytes(npz(elevation=np.arange(12.0).reshape(3, 4)))
-    with pytest.raises(SettingError, match=r"height_m = 3\.0: allowed is None: the file's world is 3-D"):
+    with pytest.raises(SettingError, match=r"height_m = 3\.0: expected None: the file's world is 3-D"):
         load_world(hills, resolution_m=1.0, height_m=3.0)
 
 

@@ -68,7 +68,7 @@ def test_a_world_number_that_is_none_is_refused(number):
 
 def test_a_world_file_that_is_missing(tmp_path):
     path = tmp_path / "nowhere.bt"
-    with pytest.raises(WorldError, match="allowed is a file that exists") as raised:
+    with pytest.raises(WorldError, match="expected a file that exists") as raised:
         world_from_file(path, 0.5)
     assert str(path) in str(raised.value)
 

@@ -150,7 +150,7 @@ def test_planar_robots_start_in_their_plane():
     on_edge = Robot(motion="planar", sensor_height_m=0.3)
     assert free_box(grid=Grid((9, 6, 5), 0.1)).layer_of(on_edge) == 3  # 0.3 / 0.1 is less in binary
     low = free_box(grid=world.grid, robot={"motion": "planar", "sensor_height_m": 0.2, "body_radius_m": 0.4})
-    with pytest.raises(WorldError, match="in layer 0, where planar robots stay"):
+    with pytest.raises(WorldError, match=r"at the height of the sensor, .* --robot\.sensor-height-m"):
         world.layout(low)
 
 
@@ -249,7 +249,7 @@ def test_layouts_of_other_bodies_are_other_layouts():
     [np.zeros((7, 11, 4), bool), np.zeros(SIZE, np.int8), np.ones(SIZE, bool), np.zeros(385, bool)],
 )
 def test_worlds_that_are_none_are_refused(occupied):
-    with pytest.raises(WorldError, match=r"World\.occupied = .*: allowed is") as raised:
+    with pytest.raises(WorldError, match=r"World\.occupied = .*: expected") as raised:
         World(Grid(SIZE, 0.5), occupied, "bad")
     assert raised.value.field == "World.occupied"
 
@@ -285,7 +285,8 @@ def test_worlds_are_compared_and_hashed_by_identity():
 def test_a_body_that_fits_nowhere():
     with pytest.raises(WorldError) as raised:
         world_of(np.zeros(SIZE, bool)).layout(free_box(robot={"body_radius_m": 2.0}))
-    assert str(raised.value) == "world = 'by hand': allowed is a world with room for a body of radius 2.0 m"
+    said = "expected room for a body with a radius of 2.0 m; see --robot.body-radius-m and --voxel-size-m"
+    assert str(raised.value) == f"world = 'by hand': {said}"
 
 
 def test_a_body_larger_than_all_but_one_side_of_a_world():

@@ -33,7 +33,7 @@ def test_claims_stand_in_groups_with_what_ours_span_and_how_many_hold():
     assert lines[2:] == ["| it falls | < 1 | 0.512 … 2 | 1 of 2 |", "| places | - | 3 of 5 | 1 of 1 |"]
     (line,) = groups_table([CLAIM], {"": "all", "t-": "it falls"}).splitlines()[2:]  # the longest beginning
     assert line == "| it falls | < 1 | 0.5124 (0.4 … 12,346) | 1 of 1 |"
-    with pytest.raises(SettingError, match="claim = 'u': allowed is in a group: t-"):
+    with pytest.raises(SettingError, match="claim = 'u': expected one in a group: t-"):
         groups_table(OTHERS, {"t-": "it falls"})
     texts = [claim.claim for claim in told([CLAIM, OTHERS[0]], {"t-": "it falls"})]
     assert texts == ["it falls: from 2", "it falls"]

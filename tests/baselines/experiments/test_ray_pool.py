@@ -83,7 +83,7 @@ def test_results_errors_limits_and_lost_workers(two_workers, tmp_path, monkeypat
     found: dict[Any, Any] = dict(run_each(work, [*tasks, once], LOCAL, 1.0))
     assert len(found) == len(tasks) + 1
     assert [found[task] for task in squares] == [0, 1, 4, 9, 16]
-    assert found["raise", 0].reason == "SettingError: field = 3: allowed is less"
+    assert found["raise", 0].reason == "SettingError: field = 3: expected less"
     assert isinstance(found["raise", 0].error, SettingError) and "in work" in found["raise", 0].trace
     assert "pickle" in found["lambda", 0].reason and "pickle" in found[unpicklable].reason
     assert found["late", 0] == Failure("ran past 1 s on the clock", late=True)
@@ -178,7 +178,7 @@ def test_an_address_where_no_cluster_answers_is_one_line(monkeypatch):
     monkeypatch.setattr(ray_cluster, "ANSWER_TIMEOUT_S", 3.0)
     with pytest.raises(SettingError) as said:
         list(run_each(work, [("square", 2)], RayCluster("127.0.0.1:9")))
-    assert str(said.value) == "cluster = '127.0.0.1:9': allowed is that of a Ray cluster that answers"
+    assert str(said.value) == "cluster = '127.0.0.1:9': expected the address of a Ray cluster that answers"
 
 
 COMMAND = """

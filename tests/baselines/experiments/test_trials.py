@@ -147,7 +147,7 @@ def test_failures_are_raised_or_kept_and_a_longer_limit_runs_late_ones_again(tmp
 
 
 def test_what_contradicts_itself(tmp_path):
-    with pytest.raises(SettingError, match=r"since.*left out together with --rerun"):
+    with pytest.raises(SettingError, match=r"since.*no value beside --rerun"):
         How(rerun=True, since="HEAD")
     with pytest.raises(SettingError, match=r"cell = 'square, seed 1'.*one trial"):
         run_trials([Square(1), Square(2), Square(1)], tmp_path / "t.jsonl", How())

@@ -76,11 +76,11 @@ def test_errors_are_failures_in_their_place(jobs):
     tasks = [("raise", 0), SQUARES[3], ("particular", 0), ("leave", 0), SQUARES[4]]
     found = outcomes(tasks, jobs)
     assert (found[SQUARES[3]], found[SQUARES[4]]) == (9, 16)
-    assert found["raise", 0].reason == "SettingError: field = 3: allowed is less"
+    assert found["raise", 0].reason == "SettingError: field = 3: expected less"
     assert isinstance(found["raise", 0].error, SettingError) and not found["raise", 0].late
     assert found["particular", 0].reason == "ParticularError: one two words"
     assert found["leave", 0].reason == "SystemExit: 3"
-    with pytest.raises(SettingError, match="allowed is less") as raised:
+    with pytest.raises(SettingError, match="expected less") as raised:
         found["raise", 0].throw()
     assert "in work" in str(raised.value.__cause__)  # where it was
     with pytest.raises(RuntimeError, match="SystemExit"):

@@ -133,12 +133,12 @@ def test_the_command_shows_a_table_and_can_be_strict(new_paper, tmp_path, capsys
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["rocha05"], "paper = 'rocha05': allowed is one of rocha04"),
-        (["rocha04", "--seeds", "0"], "seeds = 0: allowed is a whole number"),
+        (["rocha05"], "paper = 'rocha05': expected one of rocha04"),
+        (["rocha04", "--seeds", "0"], "seeds = 0: expected a whole number"),
         (["rocha04", "--jobs", "0"], "jobs = 0"),
-        (["rocha04", "--worlds", "pyproject.toml"], "left out: rocha04 takes none"),
-        (["rocha04", "--rerun", "--since", "HEAD"], "since = 'HEAD': allowed is left out"),
-        (["rocha04", "--since", "nothing"], "since = 'nothing': allowed is a commit"),
+        (["rocha04", "--worlds", "pyproject.toml"], "no value: rocha04 takes none"),
+        (["rocha04", "--rerun", "--since", "HEAD"], "since = 'HEAD': expected no value"),
+        (["rocha04", "--since", "nothing"], "since = 'nothing': expected a commit"),
         (["rocha04", "--frobnicate"], "--frobnicate"),
     ],
 )
@@ -154,11 +154,11 @@ def test_bad_input_is_one_line_and_nothing_is_run(words, said, tmp_path, capsys)
     [
         (
             '{{ figure("scan", "x") }}',
-            "figure of the page = 'scan': allowed is one of scans; did you mean scans",
+            "figure of the page = 'scan': expected one of scans; did you mean scans",
         ),
         ('{{ table("scan") }}', "table of the page = 'scan'"),
         ('{{ value("scan") }}', "value of the page = 'scan'"),
-        ("{{ clams }}", "template = 't.md.j2': allowed is one that asks for .*'clams' is undefined"),
+        ("{{ clams }}", "template = 't.md.j2': expected one that asks for .*'clams' is undefined"),
         ("{{ figure( }}", "template = 't.md.j2, line 1'"),
     ],
 )

@@ -141,10 +141,10 @@ def test_teams_differ_in_their_channel_alone():
 
 
 def test_unknown_suites_and_missing_worlds_are_named(monkeypatch):
-    with pytest.raises(SettingError, match=r"suite = .plan.: allowed is one of plans, volumes, teams"):
+    with pytest.raises(SettingError, match=r"suite = .plan.: expected one of plans, volumes, teams"):
         find_suite("plan", False, TEAMS)
     monkeypatch.setattr(bundled_worlds, "WORLDS", Path("/nowhere"))
-    with pytest.raises(SettingError, match=r"suite world = '/nowhere/geb079.npz': allowed is there"):
+    with pytest.raises(SettingError, match=r"suite world = '/nowhere/geb079.npz': expected a file that"):
         find_suite("volumes", False, TEAMS)
 
 

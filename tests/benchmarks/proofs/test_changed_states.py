@@ -20,4 +20,4 @@ def test_a_changed_state_is_refused_by_name_or_goes_on(numbers):
 
 def test_a_refusal_names_the_number():
     refused = [said for what, said in map(change, range(12)) if said]
-    assert refused and all("allowed is" in said for said in refused)
+    assert refused and all("expected" in said for said in refused)

@@ -86,11 +86,11 @@ def test_the_page_says_what_each_proof_is():
 def test_bad_input_is_refused_before_anything_is_played(tmp_path):
     (tmp_path / "file").write_text("")
     for args, said in (
-        (Args(("luck",)), "names = 'luck': allowed is one of settings, states, determinism"),
-        (Args(cases=0), "cases = 0: allowed is a whole number ≥ 1"),
-        (Args(cases=5, full=True), "cases = 5: allowed is given without --full"),
-        (Args(first=-1), "first = -1: allowed is a whole number ≥ 0"),
-        (Args(limit_s=0.0), "limit_s = 0.0: allowed is a number > 0"),
+        (Args(("luck",)), "names = 'luck': expected one of settings, states, determinism"),
+        (Args(cases=0), "cases = 0: expected a whole number ≥ 1"),
+        (Args(cases=5, full=True), "cases = 5: expected no value beside --full"),
+        (Args(first=-1), "first = -1: expected a whole number ≥ 0"),
+        (Args(limit_s=0.0), "limit_s = 0.0: expected a number > 0"),
         (Args(limit_s=float("nan")), "limit_s = nan"),
         (Args(out=tmp_path), "a file, and this is a folder"),
         (Args(out=tmp_path / "file" / "page.md"), "a folder that can be made"),

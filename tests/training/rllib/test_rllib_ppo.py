@@ -146,6 +146,6 @@ def test_nobody_at_the_address(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(ray_cluster, "ANSWER_TIMEOUT_S", 3.0)
     assert run_command(main, ["--address", "127.0.0.1:9", "--out", str(tmp_path)]) == 2
     said = capsys.readouterr().err
-    assert said == "error: address = '127.0.0.1:9': allowed is that of a Ray cluster that answers\n"
+    assert said == "error: address = '127.0.0.1:9': expected the address of a Ray cluster that answers\n"
     assert run_command(main, ["--address", "auto", "--out", str(tmp_path)]) == 2
     assert capsys.readouterr().err.count("\n") == 1

@@ -36,7 +36,7 @@ def test_the_ceiling_follows_the_ground():
     assert voxels.labels.shape == (2, 3, 7)
     assert voxels.ceiling is not None and voxels.ceiling.dtype == np.int32
     assert voxels.ceiling.tolist() == [[3, 3, 4], [5, 6, 4]]
-    with pytest.raises(SettingError, match=r"ceiling_m = 0\.9: allowed is at least one voxel"):
+    with pytest.raises(SettingError, match=r"ceiling_m = 0\.9: expected at least one voxel"):
         columns(HILLS, (1.0, 1.0), Options({"ceiling_m": 0.9}))
 
 

@@ -92,7 +92,7 @@ def test_a_plan_is_resampled_and_extruded(tmp_path):
     assert world.grid.shape == (4, 3, 3)
     assert world.occupied[1].all()
     assert not world.occupied[[0, 2, 3]].any()
-    with pytest.raises(SettingError, match=r"height_m = 0\.1: allowed is from 2 to"):
+    with pytest.raises(SettingError, match=r"height_m = 0\.1: expected from 2 to"):
         load(tmp_path, png(shades), voxel_size_m=0.1, height_m=0.1)
 
 
@@ -105,7 +105,7 @@ def test_a_16_bit_png_is_a_height_map(tmp_path):
     assert world.occupied.sum(axis=2).tolist() == [[1, 1], [3, 3], [6, 6]]
     with pytest.raises(SettingError, match="resolution_m = None"):
         load(tmp_path, png(counts))
-    with pytest.raises(SettingError, match="negate = True: allowed is None"):
+    with pytest.raises(SettingError, match="negate = True: expected None"):
         load(tmp_path, png(counts), resolution_m=1.0, negate=True)
 
 

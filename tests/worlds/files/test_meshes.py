@@ -81,7 +81,7 @@ def test_settings_and_sizes(tmp_path):
     path = write(tmp_path, "obj")
     with pytest.raises(SettingError, match="voxel_size_m = None"):
         load_world(path)
-    with pytest.raises(SettingError, match=r"ceiling_m = 1\.0: allowed is None: it does not apply to mesh"):
+    with pytest.raises(SettingError, match=r"ceiling_m = 1\.0: expected None: it does not apply to mesh"):
         load_world(path, 0.5, ceiling_m=1.0)
     with pytest.raises(WorldError, match="at most"):
         load_world(path, 1e-3)

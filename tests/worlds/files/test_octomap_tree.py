@@ -180,7 +180,7 @@ def refused(path, voxel_size_m=None):
     assert error.field in ("world file", "voxel_size_m")
     assert error.allowed
     assert "\n" not in str(error)
-    assert str(error) == f"{error.field} = {error.value!r}: allowed is {error.allowed}"
+    assert str(error) == f"{error.field} = {error.value!r}: expected {error.allowed}"
     return error
 
 
@@ -314,7 +314,7 @@ def test_a_map_without_free_space_is_refused(tmp_path):
 
 @pytest.mark.parametrize("size", [0.0, -1.0, math.nan, math.inf])
 def test_a_voxel_size_that_is_none_is_refused(tmp_path, size):
-    with pytest.raises(SettingError, match=r"voxel_size_m = .*: allowed is a number > 0"):
+    with pytest.raises(SettingError, match=r"voxel_size_m = .*: expected a number > 0"):
         load_octomap(tmp_path / "nowhere.bt", size)
 
 

@@ -156,7 +156,7 @@ def test_a_grid_that_is_too_small_is_refused_by_name(name):
     if long > short:
         too_small.append((long - 1, short, high))
     for shape in too_small:
-        with pytest.raises(WorldError, match=r"Grid\.shape = .*: allowed is .* m") as raised:
+        with pytest.raises(WorldError, match=r"Grid\.shape = .*: expected .* m") as raised:
             RECIPES[name](Grid(shape, edge_m), np.random.default_rng(0))
         assert raised.value.field == "Grid.shape" and raised.value.value == shape
 

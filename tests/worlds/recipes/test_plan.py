@@ -120,6 +120,6 @@ def test_too_small_a_workspace_is_named():
     require_size(Grid((30, 40, 7), 0.1), "a hut", 4.0, 3.0)
     with pytest.raises(WorldError) as raised:
         require_size(Grid((39, 31, 1), 0.1), "a hut", 4.0, 3.0)
-    assert str(raised.value) == "Grid.shape = (39, 31, 1): allowed is at least 4 × 3 m for a hut"
+    assert str(raised.value) == "Grid.shape = (39, 31, 1): expected at least 4 × 3 m for a hut"
     with pytest.raises(WorldError, match=r"at least 4 × 3 m for a hut, 2-D or 0\.6 m high"):
         require_size(Grid((40, 31, 6), 0.1), "a hut", 4.0, 3.0)
