@@ -25,7 +25,7 @@ def test_it_is_one_screen_and_some_links():
 def test_the_first_screen_says_what_the_wheel_holds():
     screen = README.split("## ")[0]
     assert "`pip install` brings the library" in screen and "from a clone" in screen
-    assert "mission.gif" in screen
+    assert "mission.webp" in screen
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
