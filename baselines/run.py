@@ -63,7 +63,7 @@ class Args:
     """Seed of the world, the starts and all other draws."""
     task: Annotated[TaskOptions, Mark.INLINE] = dataclasses.field(default_factory=TaskOptions)
     out: Path | None = None
-    """Folder for mission.json, mission.png, mission.gif and mission.npz."""
+    """Folder for mission.json, mission.png, mission.gif, mission.npz and the team's map."""
     record: Path | None = None
     """File for the mission's record, an .npz that baselines.replay runs again."""
     output: Annotated[Outputs, Mark.INLINE] = dataclasses.field(default_factory=Outputs)

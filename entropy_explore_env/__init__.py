@@ -32,6 +32,7 @@ from entropy_explore_env.errors import (
 )
 from entropy_explore_env.explorer.explorer import Explorer
 from entropy_explore_env.explorer.goals import Goal, NoGoal
+from entropy_explore_env.interop.map_files import load_map, save_map
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView
@@ -101,10 +102,12 @@ __all__ = [
     "WorldWarning",
     "env",
     "find_scenario",
+    "load_map",
     "load_octomap",
     "load_world",
     "make_world",
     "parallel_env",
+    "save_map",
     "save_world",
     "with_settings",
 ]

@@ -16,6 +16,8 @@ from baselines.cli.arguments import make_folder, print_json
 from baselines.cli.progress import named, print_table
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.interop.map_files import save_map
+from entropy_explore_env.interop.team_maps import joint_map
 from entropy_explore_env.reports.animation import Film, animate, write_video
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.mission_record import CommandRecorder, save_record
@@ -53,7 +55,8 @@ class Wanted:
 
     Attributes:
         outputs: Those that each have an option.
-        out: Folder for mission.json, mission.png and mission.gif, and for mission.npz where it is `recorded`.
+        out: Folder for mission.json, mission.png, mission.gif and the team's map, and for mission.npz where
+            it is `recorded`.
         record: A mission record, an `.npz`.
         recorded: Whether the folder gets a record, too; a replay has one already.
     """
@@ -197,7 +200,9 @@ class MissionLog:
         write_atomically(folder / "mission.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
         picture = mission_picture(recorder, named(figures), figures["strategy"], self._wanted.outputs.truth)
         write_atomically(folder / "mission.png", picture)
-        return [folder / "mission.json", folder / "mission.png"]
+        team_map = joint_map(recorder.missions)
+        name = "map.yaml" if team_map.grid.flat else "map.npz"
+        return [folder / "mission.json", folder / "mission.png", *save_map(team_map, folder / name)]
 
 
 def show_results(env: EntropyExploreEnv, figures: dict[str, Any], written: list[Path], as_json: bool) -> None:

@@ -35,7 +35,8 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
     takes as its option `world`; -1 where no recipe made it), `entropy_bits`, `own_bits` and
     `received_bits` (taken from its map in this step), `move_end` and `end` (names of a MoveEnd and
     a MissionEnd), and `action_mask` where actions are numbers; when the mission is over, `figures`:
-    those of `mission_figures`, and beside them the two of END_FIGURES. Where the scenario has faults
+    those of `mission_figures`, and beside them the two of END_FIGURES. Where the mission ends by what the
+    team has seen also `seen_share`, of all that can be seen. Where the scenario has faults
     also `stopped`, `blind` and `silent`: whether the robot fails so now. Where robots drift also
     `pose_error_m` and `pose_error_rad`: so far off was what the robot believed of its pose
     when it last scanned or decided under way; nobody acts on it.
@@ -65,6 +66,9 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
             strict=True,
         )
     ]
+    if missions.scenario.ending.by_seen:
+        for info in infos:
+            info["seen_share"] = float(clock["explored_visible"] / max(clock["visible"], 1))
     if missions.rules.faults is not None:
         for name, now in failing(missions.state.faults[mission], time_s).items():
             for info, failed in zip(infos, now.tolist(), strict=True):

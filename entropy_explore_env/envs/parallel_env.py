@@ -13,10 +13,12 @@ from pettingzoo import ParallelEnv
 from pettingzoo.utils import OrderEnforcingWrapper
 from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 
+from entropy_explore_env.belief.belief_map import Map
 from entropy_explore_env.envs.checks import ActionChecker
 from entropy_explore_env.envs.infos import robot_infos
 from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
 from entropy_explore_env.errors import ActionError, CallOrderError, SettingError, one_of
+from entropy_explore_env.interop.team_maps import joint_map
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation import layout
 from entropy_explore_env.missions.reset_options import mission_options, named_options
@@ -228,6 +230,16 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
 
     def _infos(self) -> dict[str, dict[str, Any]]:
         return dict(zip(self.agents, robot_infos(self.missions, 0), strict=True))
+
+    def joint_map(self) -> Map:
+        """What the team knows together: see `interop.team_maps.joint_map`; for files, `interop.map_files`.
+
+        Raises:
+            CallOrderError: There was no reset yet.
+        """
+        if self.missions.episodes[0] < 0:
+            raise CallOrderError("joint_map before reset: call reset() first")
+        return joint_map(self.missions)
 
     def render(self) -> np.ndarray | None:
         """The picture of this moment, (480, 640, 3) uint8 for `rgb_array`; `human` shows it by itself."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from entropy_explore_env.belief.belief_map import Map
 from entropy_explore_env.missions.action import ROUNDING, encode_viewpoint
 from entropy_explore_env.missions.localization import believed_pose
 from entropy_explore_env.missions.poses import place_at, pose_at, since_scan_m, speed_at
@@ -76,6 +77,11 @@ class RobotView(RobotKnowledge):
     def action_for(self, viewpoint: np.ndarray) -> np.ndarray | np.int64:
         """The action that sends the robot to a viewpoint (5,): see `encode_viewpoint`."""
         return encode_viewpoint(self.rules, self.pose, viewpoint, self.robot, self.candidates)
+
+    @property
+    def map(self) -> Map:
+        """Its belief as a Map: a copy, with σ and where it lies."""
+        return Map(self.scenario.grid, self.mean, self.precision, self.scenario.sigma_prior)
 
     def scan_places(self, path_m: np.ndarray) -> np.ndarray:
         """Where the robot would scan under way on a path from its place, the scan at its end not among them.

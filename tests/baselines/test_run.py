@@ -52,7 +52,7 @@ NAMED = (
     "wall_s",
 )
 """Keys that the README and README promises."""
-FILES = ["mission.gif", "mission.json", "mission.npz", "mission.png"]
+FILES = ["map.npz", "mission.gif", "mission.json", "mission.npz", "mission.png"]
 SHORT = ("--ending.time-limit-s", "8")
 
 
