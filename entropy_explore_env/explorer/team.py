@@ -9,7 +9,8 @@ import numpy as np
 from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.explorer.poses import turned_by
 from entropy_explore_env.explorer.workspace import Fused, Workspace
-from entropy_explore_env.missions.view import RobotView, ScanView, TeammateView, read_only
+from entropy_explore_env.missions.view import RobotView, read_only
+from entropy_explore_env.robots.knowledge import ScanView, TeammateView
 from entropy_explore_env.robots.motion import MoveEnd
 
 
