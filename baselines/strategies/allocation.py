@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -141,7 +142,8 @@ class Allocator:
                 return None
             least = np.where(np.isfinite(edges), edges, np.maximum(reach, apart - 2.0))  # centre to centre
             seconds = seconds_of(self._view.scenario, robot, least)
-            value = self._values(slots, voxels, Options(counted, seconds, least, takes))
+            worth = partial(self._worth, Options(counted, seconds, least, takes))
+            value = self._candidates.worths(slots, voxels, counted, worth)
             best = int(np.argmax(value))
             if value[best] == -math.inf:
                 return None
@@ -149,25 +151,10 @@ class Allocator:
                 return Choice(int(voxels[best]), float(value[best]), float(seconds[best]))
             self._search(robot, _EXTENSION * reach)
 
-    def _values(self, slots: np.ndarray, voxels: np.ndarray, options: Options) -> np.ndarray:
-        """Return (K,) values of candidates; -inf where nothing is seen, or the candidate cannot be the best.
-
-        `options.seen` is NaN where it was not counted yet; it is filled in.
-        """
-        counted = options.seen
-        most = self._candidates.upper_bounds(slots) * self._candidates.point
-        bound = self._value(options._replace(seen=np.where(np.isnan(counted), most, counted)))
-        value, size = np.full(len(slots), -np.inf), self._candidates.batch
-        order = np.argsort(-bound, kind="stable")
-        for first in range(0, len(order), size):
-            batch = order[first : first + size]
-            if bound[batch[0]] < value.max():
-                break
-            fresh = batch[np.isnan(counted[batch])]
-            counted[fresh] = self._candidates.count(slots[fresh], voxels[fresh]) * self._candidates.point
-            worth = self._value(Options(*(array[batch] for array in options)))
-            value[batch] = np.where(counted[batch] > 0.0, worth, -np.inf)
-        return value
+    def _worth(self, options: Options, seen: np.ndarray, which: np.ndarray) -> np.ndarray:
+        """Return (N,) values of some options from which (N,) points are seen; -inf where nothing is."""
+        seen_of = Options(seen * self._candidates.point, *(array[which] for array in options[1:]))
+        return np.where(seen > 0.0, self._value(seen_of), -np.inf)
 
     def _search(self, robot: int, reach: float) -> None:
         """Search a robot's paths up to a length, and keep the lengths of those that lead to candidates."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -76,7 +76,7 @@ class FrontierMap(ABC):
 
     point: float
     """Size of a point: m² in plans and over terrain, else m³."""
-    batch: int
+    _batch: int
     """How many candidates are counted in one call; it changes no result."""
     body_reach: int
     """Voxels that the body extends beyond its own, along an axis."""
@@ -201,6 +201,37 @@ class FrontierMap(ABC):
     def upper_bounds(self, slots: np.ndarray) -> np.ndarray:
         """Return (K,) upper bounds of V·(height factor) of the candidates in (K,) slots."""
         return np.minimum(self._bounds[slots], self._most)
+
+    def worths(
+        self,
+        slots: np.ndarray,
+        voxels: np.ndarray,
+        counted: np.ndarray,
+        worth: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    ) -> np.ndarray:
+        """Return what candidates are worth, counting V only of those that can be worth most.
+
+        Args:
+            slots: (K,) of the candidates.
+            voxels: (K,) int32, theirs.
+            counted: (K,) V·(height factor) in points as counted before, NaN = not yet; filled in.
+            worth: (N,) V·(height factor) in points and (N,) indices of candidates → (N,) what these are
+                worth, never less for a greater V.
+
+        Returns:
+            (K,); -inf for candidates that cannot be worth most.
+        """
+        most = np.where(np.isnan(counted), self.upper_bounds(slots), counted)
+        bound, found = worth(most, np.arange(len(slots))), np.full(len(slots), -np.inf)
+        order = np.argsort(-bound, kind="stable")
+        for first in range(0, len(order), self._batch):
+            batch = order[first : first + self._batch]
+            if bound[batch[0]] < found.max():
+                break
+            fresh = batch[np.isnan(counted[batch])]
+            counted[fresh] = self.count(slots[fresh], voxels[fresh])
+            found[batch] = worth(counted[batch], batch)
+        return found
 
     def listed(self, all_of_them: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Return (K,) slots and (K,) int32 voxels of candidates: all, or those that may see something."""

@@ -70,7 +70,7 @@ class TerrainFrontiers(FrontierMap):
             fade=self.reach if frontiers.unexplored_ground == "falling" else math.inf,
         )
         self._widths, self.point = half_widths(self.reach), edge**2
-        self.batch = 1 + BATCH_CELLS // max(math.ceil(len(yaws) * self.reach), 1)
+        self._batch = 1 + BATCH_CELLS // max(math.ceil(len(yaws) * self.reach), 1)
         factor = 1.0 if frontiers.gamma is None else edge * high
         self._most = min(math.pi * (self.reach + 2.0) ** 2, float(x * y)) * factor
 

@@ -68,7 +68,7 @@ class VoxelFrontiers(FrontierMap):
         self._tree = grow_tree(self._rays, self.reach, self._size)
         self._met = np.empty(self._tree.cells, np.int32)
         self._gaze_pitches = (0.0, -0.7, 0.7) if layer is None else (0.0,)
-        self.batch = 1 + BATCH_CELLS // len(self._tree.after)
+        self._batch = 1 + BATCH_CELLS // len(self._tree.after)
         self.point = edge ** (2 if scenario.grid.flat else 3)
         wide = self.reach + 2.0
         ball = math.pi * wide**2 if self._size[2] == 1 else 4.0 / 3.0 * math.pi * wide**3

@@ -15,8 +15,6 @@ an earlier count, but for what has turned free since.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from entropy_explore_env.planner.frontier_rule import FrontierRule
@@ -43,22 +41,10 @@ class InformationGain(FrontierRule):
             voxels, lengths = scene.paths.nearest_frontiers()
             return best_of(voxels, -lengths, scene.target)
         slots, voxels, lengths = slots[near], voxels[near], lengths[near]
-        bounds = scene.cells.upper_bounds(slots)
-        return best_of(voxels, self._worths(scene, slots, voxels, lengths, bounds), scene.target)
-
-    def _worths(
-        self, scene: Scene, slots: np.ndarray, voxels: np.ndarray, lengths: np.ndarray, bounds: np.ndarray
-    ) -> np.ndarray:
-        """Return (K,) worths, as far as it takes to know the greatest; -inf for cells that cannot have it."""
         weight = self.weight * scene.cells.reach
-        bound = weight * np.log1p(bounds) - lengths
-        order, size = np.argsort(-bound, kind="stable"), scene.cells.batch
-        worth, most = np.full(len(voxels), -np.inf), -math.inf
-        for first in range(0, len(order), size):
-            batch = order[first : first + size]
-            if bound[batch[0]] < most:
-                break
-            gains = scene.cells.count(slots[batch], voxels[batch])
-            worth[batch] = weight * np.log1p(gains) - lengths[batch]
-            most = float(worth.max())
-        return worth
+
+        def worth(gains: np.ndarray, which: np.ndarray) -> np.ndarray:
+            return np.asarray(weight * np.log1p(gains) - lengths[which])
+
+        uncounted = np.full(len(voxels), np.nan)
+        return best_of(voxels, scene.cells.worths(slots, voxels, uncounted, worth), scene.target)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.metadata
 import json
 import os
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -21,7 +22,9 @@ from entropy_explore_env.settings.scenarios import BOX
 from tests.code_blocks import shown_files
 
 ROOT = Path(__file__).parents[3]
-EXAMPLE, SECOND_NEAREST = (ROOT / f"docs/examples/{name}.py" for name in ("own_strategy", "second_nearest"))
+EXAMPLE, SECOND_NEAREST, ITS_TEST = (
+    ROOT / f"docs/examples/{name}.py" for name in ("own_strategy", "second_nearest", "test_second_nearest")
+)
 SOURCE = """
 class Own:
     def reset(self, scenario, rng): pass
@@ -74,7 +77,7 @@ def test_the_example_runs_and_is_benchmarked_from_a_folder_outside(tmp_path):
 
 
 def test_the_page_shows_the_example_as_it_is():
-    assert {EXAMPLE, SECOND_NEAREST} <= set(shown_files())
+    assert {EXAMPLE, SECOND_NEAREST, ITS_TEST} <= set(shown_files())
     assert len(EXAMPLE.read_text().splitlines()) <= 30 and len(SECOND_NEAREST.read_text().splitlines()) <= 12
 
 
@@ -92,6 +95,14 @@ def test_a_function_of_one_argument_is_a_rule(robots):
     state = env.missions.state
     assert state.missions[0]["entropy_end_bits"] < state.missions[0]["entropy_start_bits"]
     assert (state.robots[0]["distance_m"] > 0.5).all()
+
+
+def test_the_test_that_the_page_shows_passes(monkeypatch):
+    monkeypatch.syspath_prepend(SECOND_NEAREST.parent)
+    shown = {name: value for name, value in runpy.run_path(str(ITS_TEST)).items() if name.startswith("test_")}
+    assert len(shown) == 1
+    for test in shown.values():
+        test()
 
 
 @pytest.mark.parametrize("picked", ["-7", "10**9", "2.5", "None", "True"])
