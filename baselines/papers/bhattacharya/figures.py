@@ -135,7 +135,8 @@ def figure_6(records: Records, variant: str, settings: str) -> Figure:
         entropy = maps[f"entropy_{number}"].astype(float) / 255.0
         cells, iteration = maps[f"cells_{number}"], int(maps[f"iteration_{number}"])
         picture = np.ones((*entropy.shape, 3))
-        picture[:, :, 0] = picture[:, :, 2] = 1.0 - 0.75 * np.clip((entropy - 0.3) / 0.7, 0.0, 1.0)
+        uncertain = np.clip((entropy - 0.3) / 0.7, 0.0, 1.0)
+        picture -= uncertain[..., None] * (0.45, 0.1, 0.45)
         picture[cells < 0] = 0.55
         picture[maps[f"occupied_{number}"]] = 0.1
         picture[_borders(cells)] = _BORDER

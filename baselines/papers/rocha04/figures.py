@@ -39,7 +39,8 @@ def figure_3(records: Records) -> Figure:
         axes.plot([time_s, time_s], [end, level], "--", color="0.5", linewidth=1)
         axes.plot([0, time_s], [level, level], "--", color="0.5", linewidth=1)
         side = "left" if level > 0 else "right"
-        axes.annotate(f" {time_s:,.0f} s  ", (time_s, level), fontsize=8, va="bottom", ha=side)
+        place = {"xytext": (4 if side == "left" else -14, 3), "textcoords": "offset points"}
+        axes.annotate(f"{time_s:,.0f} s", (time_s, level), fontsize=8, va="bottom", ha=side, **place)
     ratio = record["t_mission_s"] / record["half_s"]
     axes.set(
         title=f"Fig. 3: one robot, median mission (seed {record['seed']}); ratio {ratio:.1f}, paper 7.45"

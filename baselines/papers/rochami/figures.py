@@ -69,8 +69,8 @@ def figure_6(records: Records) -> Figure:
         axes.plot([2], [PAPER_UNCOORDINATED * one_s], "*", color=COLOURS[1], **star)
         axes.plot([2], [PAPER_REAL * one_s], "D", color="w", markeredgecolor="k", markersize=5)
         axes.axhline(one_s, color="0.8", linewidth=0.8)
-        axes.set(xlabel="robots", xticks=sizes, ylim=(0, None), title=f"blocked robots {blocked}")
-    panels[0].set_ylabel("mission time (s)")
+        axes.set(xlabel="robots", xticks=sizes, title=f"blocked robots {blocked}")
+    panels[0].set(ylabel="mission time (s)", ylim=(0, None))
     panels[0].legend(frameon=False, fontsize=8)
     note = "★ the paper's ratios for 2 robots (0.59, 0.81)\n◇ its real run (0.72)\ntimes our one robot"
     place = {"transform": panels[1].transAxes, "ha": "right", "va": "top", "fontsize": 8}
@@ -157,10 +157,12 @@ def figure_sharing(records: Records) -> Figure:
             points = [mean_interval(sample(records, cell)) for cell in cells.values()]
             interval_line(axes, sent, points, linestyle=line, color=COLOURS[number], label=label)
             for text, x, point in zip(cells, sent, points, strict=True):
-                place = {"xytext": (4, 5), "textcoords": "offset points", "fontsize": 8}
+                place = {"xytext": (4, 5 - 15 * number), "textcoords": "offset points", "fontsize": 8}
                 axes.annotate(text, (x, point.value), color=COLOURS[number], **place)
         axes.set(
             xlabel="bits sent by the team (Mbit)", ylabel="mission time (s)", title=f"{n} robots, burst 64"
         )
-        axes.legend(frameon=False, fontsize=8)
+    figure.legend(
+        *figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False
+    )
     return figure

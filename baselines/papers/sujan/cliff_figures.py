@@ -62,8 +62,8 @@ def figure_looks(records: Records) -> Figure:
         for field, colour in (("expected", COLOURS[0]), ("obtained", COLOURS[1])):
             rows = looks_of(records, method, field, MORE)
             mean_band(axes, np.arange(1, rows.shape[1] + 1), rows, color=colour, label=field)
-        axes.set(title=f"method {method}", xlabel="look", ylim=(0, None))
-    figure.axes[0].set_ylabel("new columns")
+        axes.set(title=f"method {method}", xlabel="look")
+    figure.axes[0].set(ylabel="new columns", ylim=(0, None))
     figure.axes[0].legend(frameon=False)
     return figure
 

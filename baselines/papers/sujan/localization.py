@@ -241,8 +241,8 @@ def figure_19(records: Records) -> Figure:
         for number, count in enumerate(COUNTS):
             curve = np.sqrt((errors_by_way(records, cell_id(count, reach)) ** 2).mean(axis=0))
             axes.plot(EVERY_M * np.arange(len(curve)), curve, color=COLOURS[number], label=f"{count}")
-        axes.set(title=f"{reach}: up to {REACH_M[reach]:g} m", xlabel="way (m)", ylim=(0, None))
-    figure.axes[0].set_ylabel("error of the place, rms over worlds (m)")
+        axes.set(title=f"{reach}: up to {REACH_M[reach]:g} m", xlabel="way (m)")
+    figure.axes[0].set(ylabel="error of the place, rms over worlds (m)", ylim=(0, None))
     figure.axes[0].legend(frameon=False, title="fiducials within reach")
     return figure
 

@@ -128,6 +128,7 @@ def figure_bits(records: Records) -> Figure:
         packed = np.mean([record["full_packed_bits"] / record["full_bits"] for record in records[name]])
         axes.axhline(float(packed), color="black", linestyle="dotted", label="compressed map")
         axes.set(title=name, xlabel="rms error of coverage", yscale="log")
+        axes.locator_params(axis="x", nbins=4)
     figure.axes[0].set_ylabel("bits over the full map's")
     figure.axes[0].legend(frameon=False)
     return figure
