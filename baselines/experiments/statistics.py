@@ -98,17 +98,6 @@ def geometric_ratio_interval(ours: Sequence[Sample], theirs: Sequence[Sample]) -
     return Interval(float(np.exp(np.mean([log.mean() for log in logs]))), *_central(np.exp(drawn)))
 
 
-def double_ratio_interval(
-    numerator: Sample, denominator: Sample, numerator_before: Sample, denominator_before: Sample
-) -> Interval:
-    """A ratio of two means over the same ratio before, all over the same seeds, and its interval."""
-    samples = (numerator, denominator, numerator_before, denominator_before)
-    rows = np.stack([np.asarray(sample, float) for sample in samples], axis=1)
-    means = np.concatenate([rows.mean(axis=0)[None], _resampled(rows, len(rows)).mean(axis=1)])
-    ratios = means[:, 0] / means[:, 1] / (means[:, 2] / means[:, 3])
-    return Interval(float(ratios[0]), *_central(ratios[1:]))
-
-
 def interpolated_ratio_interval(
     times: np.ndarray, costs: np.ndarray, time: np.ndarray, cost: np.ndarray
 ) -> Interval:

@@ -34,7 +34,6 @@ from entropy_explore_env.settings.json import settings_json
 from entropy_explore_env.settings.scenarios import BOX, LAB, SCENARIOS
 from entropy_explore_env.worlds.load import FORMATS, save_world
 from entropy_explore_env.worlds.world import World
-from tests.systems import needs_posix
 
 ROOT = Path(__file__).parents[2]
 TINY = ("--scenarios", "box-7x11x5", "--robots", "1,2", "--time-limit-s", "150")
@@ -134,12 +133,6 @@ def test_a_finished_experiment_says_the_same_again_without_a_mission(pair, capsy
     assert [len(results[name]) for name in ("overall", "tasks", "failed", "refused")] == [2, 4, 0, 0]
 
 
-def test_two_processes_write_the_same_bytes(pair, tmp_path):
-    words = [*PAIR[:-1], "2", "--out", str(tmp_path), "--runs", str(tmp_path / "runs")]
-    assert run_command(benchmark.main, words) == 0
-    assert contents(tmp_path) == contents(pair[0])
-
-
 def test_another_run_begins_with_the_archive_of_the_first(pair, tmp_path, monkeypatch):
     """All of it: no mission is run. With a strategy more: only that one's are, and all are shown."""
     ran, real = [], trials.run_each
@@ -170,50 +163,6 @@ def test_an_archive_that_is_none_is_refused_and_nothing_is_written(pair, tmp_pat
         said = capsys.readouterr().err
         assert said.startswith("error: ") and str(archive) in said and said.count("\n") == 1
         assert not (tmp_path / "out").exists()
-
-
-KILLER = """
-import os, random, signal, sys, time
-from pathlib import Path
-from baselines import benchmark
-from baselines.cli.arguments import run_command
-import baselines.suites.page, baselines.suites.terminal, baselines.experiments.worker_pool
-from benchmarks.proofs.kills import _missions
-from tests.baselines.test_benchmark import PAIR
-
-folder, kills = Path(sys.argv[1]), int(sys.argv[2])
-moments, done = random.Random(0), []
-for kill in range(kills):
-    before, ended = len(_missions(folder)), False
-    child = os.fork()
-    if child == 0:
-        os._exit(run_command(benchmark.main, [*PAIR, "--out", str(folder)]))
-    if kill % 2:  # after a mission, or any time
-        while len(_missions(folder)) == before and not ended:
-            time.sleep(0.0005)
-            ended = os.waitid(os.P_PID, child, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
-        time.sleep(moments.uniform(0.0, 0.03))
-    else:
-        time.sleep(moments.uniform(0.0, 0.3) if kill < kills - 4 else moments.uniform(0.3, 2.0))
-    os.kill(child, signal.SIGKILL)
-    _, status = os.waitpid(child, 0)
-    done.append((os.WIFSIGNALED(status), len(_missions(folder))))
-print(done)
-"""
-"""Starts the command and kills it at random moments, many times; forks share the import."""
-
-
-@needs_posix
-def test_killed_twenty_times_it_ends_with_the_same_bytes(pair, tmp_path):
-    words = [sys.executable, "-c", KILLER, str(tmp_path), "20"]
-    ran = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
-    killed = eval(ran.stdout.splitlines()[-1])
-    counts = [count for _, count in killed]
-    assert sum(by_signal for by_signal, _ in killed) >= 15  # the rest had finished before
-    assert counts == sorted(counts) and len(set(counts)) >= 5  # it went on, and was not done at once
-    words = [sys.executable, "-m", "baselines.benchmark", *PAIR, "--out", str(tmp_path)]
-    subprocess.run(words, cwd=ROOT, capture_output=True, check=True)
-    assert contents(tmp_path) == contents(pair[0])
 
 
 # --- missions that fail

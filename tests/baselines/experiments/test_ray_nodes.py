@@ -13,7 +13,6 @@ import pytest
 
 from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.trials import Cell, How, run_cells
-from baselines.experiments.worker_pool import run_each
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import BOX
 
@@ -46,54 +45,12 @@ def machines(monkeypatch):
     cluster.shutdown()
 
 
-def second_machine() -> str:
-    """Ray's name of the second machine, while there is one."""
-    return next(node["NodeID"] for node in ray.nodes() if node["Alive"] and "second" in node["Resources"])
-
-
 def alive_machines() -> int:
     """How many machines there are, once Ray has noticed that one is gone."""
     until_s = time.monotonic() + 60.0
     while (alive := sum(node["Alive"] for node in ray.nodes())) > 1 and time.monotonic() < until_s:
         time.sleep(0.1)
     return alive
-
-
-def slow_square(task):
-    """A square, half a second later; what is begun where is noted in a file."""
-    number, folder = task
-    with Path(folder, str(number)).open("a", encoding="ascii") as trace:
-        trace.write(ray.get_runtime_context().get_node_id() + "\n")
-    time.sleep(0.5)
-    return number**2
-
-
-def begun_on(machine: str, folder: Path) -> list[str]:
-    """Which tasks were begun on a machine."""
-    return sorted(path.name for path in folder.iterdir() if machine in path.read_text("ascii").split())
-
-
-def test_tasks_of_a_machine_that_is_lost_are_begun_again_elsewhere(machines, tmp_path):
-    cluster, second = machines
-    lost, seen = second_machine(), []
-
-    def lose() -> None:
-        while not (begun := begun_on(lost, tmp_path)):
-            time.sleep(0.01)
-        seen.extend(begun)
-        cluster.remove_node(second, allow_graceful=False)
-
-    loser = threading.Thread(target=lose)
-    loser.start()
-    tasks = [(number, str(tmp_path)) for number in range(12)]
-    found = dict(run_each(slow_square, tasks, RayCluster(cluster.address)))
-    loser.join()
-    assert found == {task: task[0] ** 2 for task in tasks}
-    assert alive_machines() == 1
-    again = [name for name in seen if len((tmp_path / name).read_text("ascii").split()) > 1]
-    assert again == seen  # it was in the middle of them
-    for name in again:
-        assert (tmp_path / name).read_text("ascii").split()[-1] != lost
 
 
 def test_a_sweep_that_loses_a_machine_leaves_the_same_bytes(machines, tmp_path):

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 
-from baselines.cli.arguments import run_command
 from baselines.experiments.trials import Trial
 from baselines.papers import bhattacharya
-from baselines.papers.__main__ import main
 from baselines.papers.bhattacharya import EXPERIMENT, sweep
 from baselines.papers.bhattacharya.measured import split
 from baselines.papers.bhattacharya.run import packed, start_cells, unpacked
@@ -183,18 +181,3 @@ def test_maps_of_a_record_come_back():
     maps = {"cells_0": np.arange(6, dtype=np.int8).reshape(2, 3), "iteration_0": np.array(7)}
     found = unpacked(packed(maps))
     assert set(found) == set(maps) and all((found[name] == maps[name]).all() for name in maps)
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--seeds", "0"], "seeds"),
-        (["--worlds", "nowhere.bt"], "worlds"),
-        (["--worlds", "pyproject.toml", "README.md"], "an OctoMap of one corridor"),
-    ],
-)
-def test_bad_words_are_refused_in_one_line(words, message, capsys, tmp_path):
-    folders = ["--out", str(tmp_path), "--runs", str(tmp_path)]
-    assert run_command(main, ["bhattacharya", *words, *folders]) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("error: ") and message in error and error.count("\n") == 1
