@@ -1,14 +1,20 @@
-"""What ends a mission before its time is up, compiled: maps that are good enough, or no robot left."""
+"""What ends a mission before its time is up, compiled: good maps, no robot left, or nothing left to reach."""
 
 from __future__ import annotations
 
+import numpy as np
+
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.faults import all_gone, gone
-from entropy_explore_env.missions.scoring import holds_enough
+from entropy_explore_env.missions.scoring import driven_m, holds_enough
 from entropy_explore_env.missions.state import MissionEnd
 
 _RUNNING, _MAPPED = MissionEnd.RUNNING.code, MissionEnd.MAPPED.code
 _SEEN, _STOPPED = MissionEnd.SEEN.code, MissionEnd.STOPPED.code
+_EXHAUSTED = MissionEnd.EXHAUSTED.code
+IDLE_SCANS, IDLE_ROUNDS = 100, 8.0
+"""A mission that ends by what was seen asks what is left when nothing new was seen for so many scans a robot,
+and while the team drove so often along all edges of the workspace, a robot on average."""
 
 
 @lean_kernel
@@ -19,7 +25,11 @@ def mission_end(mission):
         end = _SEEN if seen_enough(mission) else _RUNNING
     else:
         end = _MAPPED if mapped_enough(team, clock) else _RUNNING
-    return _STOPPED if end == _RUNNING and all_gone(team.faults) else end
+    if end == _RUNNING and all_gone(team.faults):
+        return _STOPPED
+    if end == _RUNNING and team.params[0].by_seen and exhausted(mission):
+        return _EXHAUSTED
+    return end
 
 
 @lean_kernel
@@ -51,3 +61,29 @@ def seen_enough(mission):
             if not holds_enough(clock, joint.visible, mission.truth, precision[index], prior):
                 return False
     return working > 0
+
+
+@lean_kernel
+def exhausted(mission):
+    """Whether the team has long seen nothing new, and no robot has a place left to drive up to.
+
+    It looks at all voxels, but seldom: see IDLE_SCANS. What is left then lies behind gaps that beams pass and
+    bodies do not. A team that has seen enough, and has to share it, goes on.
+    """
+    clock, team, drivable = mission.clock, mission.team, mission.joint.drivable
+    shared, robots = team.params[0], team.robots
+    if clock.idle_scans < IDLE_SCANS * len(robots):
+        return False
+    edges_m = (shared.size[0] + shared.size[1] + shared.size[2]) * shared.voxel_size_m
+    if driven_m(robots) - clock.idle_from_m < IDLE_ROUNDS * edges_m * len(robots):
+        return False
+    clock.idle_scans, clock.idle_from_m = 0, driven_m(robots)
+    if clock.explored_visible >= clock.explored_end and clock.explored_free >= clock.explored_free_end:
+        return False
+    prior = np.float32(shared.prior_precision)
+    for index in range(len(robots)):
+        precision = mission.maps.beliefs.precision[index]
+        for voxel in range(len(drivable) if not gone(team.faults, index) else 0):
+            if drivable[voxel] and precision[voxel] <= prior:
+                return False
+    return True

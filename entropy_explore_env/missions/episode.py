@@ -22,7 +22,7 @@ from entropy_explore_env.settings.ending import gaussian_entropy_bits
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.given import world_in_turn
 from entropy_explore_env.worlds.load import make_world, require_unchanged
-from entropy_explore_env.worlds.sight import visible_from
+from entropy_explore_env.worlds.sight import driven_up_to, visible_from
 from entropy_explore_env.worlds.splits import draw_world_number
 from entropy_explore_env.worlds.world import World
 
@@ -132,9 +132,12 @@ def fill_start(scenario: Scenario, rules: Rules, state: MissionState, start: Sta
 def _set_seen_goal(scenario: Scenario, state: MissionState, mission: int, start: Start) -> None:
     """What can be seen, from places within reach where that ends the mission, and how much has to be."""
     clock, ending, world = state.missions[mission], scenario.ending, start.world
-    by_seen = ending.seen_share is not None or ending.unseen_free_voxels is not None
+    by_seen = ending.by_seen
     visible = visible_from(world, scenario, start.poses) if by_seen else world.visible(scenario)
     state.visible[mission] = visible.ravel()
+    if by_seen:
+        near = driven_up_to(world, scenario, start.poses)
+        state.drivable[mission] = (visible & near[:, :, None]).ravel()
     clock["visible"], clock["visible_free"] = visible.sum(), (visible & ~world.occupied).sum()
     if ending.seen_share is not None:
         clock["explored_end"] = math.ceil(ending.seen_share * clock["visible"] - 1e-9)

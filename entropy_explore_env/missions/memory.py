@@ -30,8 +30,8 @@ from entropy_explore_env.worlds.world import World
 _SPACE_BYTES = 10
 """Of a number of an observation in its space: two float32 bounds, and whether there are these bounds."""
 _MAPS = (
-    *("truth", "collision", "mean", "precision", "joint_mean", "joint_precision", "visible"),
-    *("own_mean", "own_precision"),
+    *("truth", "collision", "mean", "precision", "joint_mean", "joint_precision"),
+    *("visible", "drivable", "own_mean", "own_precision"),
 )
 _LAST_GROUP = Path("/sys/fs/cgroup/memory.max")
 _SETTING_OF_PART = {

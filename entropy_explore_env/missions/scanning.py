@@ -17,7 +17,7 @@ from entropy_explore_env.missions.messages import fuse_measurements, send_batch
 from entropy_explore_env.missions.own_maps import note_measured
 from entropy_explore_env.missions.phases import collect_batch
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
-from entropy_explore_env.missions.scoring import note_seen, score_scan
+from entropy_explore_env.missions.scoring import note_idle, note_seen, score_scan
 from entropy_explore_env.missions.summaries import share_summary
 from entropy_explore_env.robots.channel import select_measurements, steered_i_min
 from entropy_explore_env.robots.range_sensor import (
@@ -72,7 +72,9 @@ def scan_and_share(mission, sensor, index, work):
     choose_landmark(team.localization, params, index, scene, scan, own_map, work.covariances)
     note_scan(robot, mission.latest, scan, index)
     if params.track_truth:
+        known = clock.explored_visible
         score_scan(clock, mission.joint, mission.truth, scan, params.prior_precision)
+        note_idle(clock, team.robots, clock.explored_visible == known)
         note_seen(team.params, clock, team.robots)
     if len(team.robots) > 1 and params.burst > 0:
         share(mission, scan, index, work.recipients)

@@ -53,6 +53,30 @@ def note_seen(params, clock, robots):
 
 
 @lean_kernel
+def note_idle(clock, robots, idle):
+    """Count a scan that showed nothing new of what can be seen; begin anew after one that did.
+
+    Args:
+        clock: MISSION, changed in place.
+        robots: (A,) ROBOT.
+        idle: Whether the scan showed nothing new.
+    """
+    clock.idle_scans += 1
+    if not idle:
+        clock.idle_scans = 0
+        clock.idle_from_m = driven_m(robots)
+
+
+@lean_kernel
+def driven_m(robots):
+    """Metres of the team's drives, those under way taken whole."""
+    total_m = 0.0
+    for robot in robots:
+        total_m += robot.distance_m
+    return total_m
+
+
+@lean_kernel
 def holds_enough(clock, visible, truth, precision, prior_precision):
     """Whether a robot's own map holds as much of what can be seen as ends the mission.
 

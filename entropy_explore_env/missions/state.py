@@ -32,6 +32,7 @@ class MissionEnd(enum.Enum):
     CYCLES_UP = "The number of steps reached its limit."
     SEEN = "The team has seen as much of the world as the mission asks for."
     STOPPED = "All robots have stopped for good."
+    EXHAUSTED = "All that robots can drive up to is known to each, and scans long showed nothing new beyond."
 
     @property
     def code(self) -> int:
@@ -71,6 +72,9 @@ MISSION = record_type(
         ("seen_m", "f8", (5,)),  # what the team had driven then; -1 likewise
         ("explored_end", "i8"),  # so many explored visible voxels end the mission, if so it ends,
         ("explored_free_end", "i8"),  # and so many free ones
+        # since a scan showed something new, or since it was asked what is left:
+        ("idle_scans", "i8"),  # the team's scans
+        ("idle_from_m", "f8"),  # what the team had driven then
     ],
 )
 
@@ -217,6 +221,8 @@ class MissionState(NamedTuple):
     """(E, V) float32, its 1/σ²."""
     visible: np.ndarray
     """(E, V) bool, what can be seen from where robots can be."""
+    drivable: np.ndarray
+    """(E, V) bool, of that what a robot can drive up to; (E, 0) where missions do not end by what was seen."""
     missions: np.ndarray
     """(E,) MISSION."""
     robots: np.ndarray
@@ -296,6 +302,8 @@ class JointMap(NamedTuple):
     """(V,) float32."""
     visible: np.ndarray
     """(V,) bool."""
+    drivable: np.ndarray
+    """(V,) bool, or (0,)."""
 
 
 class LatestScans(NamedTuple):
@@ -363,6 +371,7 @@ def state_arrays(
         "joint_mean": ((e, tracked), np.float32),
         "joint_precision": ((e, tracked), np.float32),
         "visible": ((e, tracked), np.bool_),
+        "drivable": ((e, v if scenario.ending.by_seen else 0), np.bool_),
         "missions": ((e,), MISSION),
         "robots": ((e, a), ROBOT),
         "heard": ((e, a, a), HEARD),

@@ -23,7 +23,7 @@ from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.settings.grid import MAX_VOXELS
 from entropy_explore_env.settings.scenario import Scenario
 
-FROM_WORLD = ("truth", "collision", "visible")
+FROM_WORLD = ("truth", "collision", "visible", "drivable")
 """Arrays of the state that follow from a mission's world, which its seed and what was given determine."""
 _MOST = 1e15
 """Of seconds, metres, bits and counts: more than any mission comes to, and exact in a float64."""
@@ -91,7 +91,9 @@ def _missions(scenario: Scenario, arrays: Mapping[str, np.ndarray]) -> Iterator[
     yield Values("missions.time_s", clock["time_s"], 0.0, min(time_limit_s, _MOST))
     yield Values("missions.cycles", clock["cycles"], 0, _MOST if cycles is None else cycles)
     yield Values("missions.end", clock["end"], 0, len(MissionEnd) - 1)
-    yield Values("missions.enqueued", clock["enqueued"], 0, _MOST)
+    for name in ("enqueued", "idle_scans"):
+        yield Values(f"missions.{name}", clock[name], 0, _MOST)
+    yield Values("missions.idle_from_m", clock["idle_from_m"], -_ROUNDING, _MOST)
     yield Values("missions.reached_s", clock["reached_s"], 0.0, clock["time_s"][:, None], -1.0)
     for name in ("entropy_start_bits", "entropy_end_bits", "joint_bits"):
         yield Values(f"missions.{name}", clock[name], -_MOST, _MOST)

@@ -99,7 +99,7 @@ def step_missions(rules, state, choices, work, continuous, discrete, first, last
                 summaries_of(work.tree, state, m),
             ),
             Maps(Beliefs(state.mean[m], state.precision[m], state.pooled[m]), rules.cells),
-            JointMap(state.joint_mean[m], state.joint_precision[m], state.visible[m]),
+            JointMap(state.joint_mean[m], state.joint_precision[m], state.visible[m], state.drivable[m]),
             LatestScans(state.scan_range_m[m], state.scan_returned[m], state.scan_utility_bits[m]),
             InFlight(
                 state.in_flight[m],

@@ -14,6 +14,11 @@ from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.components import connected_components
 from entropy_explore_env.worlds.world import Collision, World
 
+_BESIDE = 1.5
+"""Voxel edges from what a body touches to the centre of the voxel beside it, diagonals included."""
+_Starts = tuple[tuple[int, int, int], ...]
+"""Voxels in which robots start."""
+
 
 def visible_from(world: World, scenario: Scenario, poses: np.ndarray) -> np.ndarray:
     """Return which voxels of `World.visible` some robot can see from a place that it can reach.
@@ -30,29 +35,58 @@ def visible_from(world: World, scenario: Scenario, poses: np.ndarray) -> np.ndar
     Returns:
         (X, Y, Z) bool.
     """
-    voxels = np.floor((poses[:, :3] - world.grid.origin_m) / world.grid.voxel_size_m).astype(np.int64)
-    voxels = np.clip(voxels, 0, np.array(world.grid.shape) - 1)
-    kinds = scenario.kinds
     seen = [
-        _visible_to(world, scenario, kind, tuple(map(tuple, voxels[first :: len(kinds)].tolist())))
-        for first, kind in enumerate(kinds)
+        _visible_to(world, scenario, kind, starts) for kind, starts in _starts_of_kinds(world, scenario, poses)
     ]
     return np.logical_or.reduce(seen)
 
 
+def driven_up_to(world: World, scenario: Scenario, poses: np.ndarray) -> np.ndarray:
+    """Return which columns of voxels some robot can drive up to: what its body could touch, and one more.
+
+    Args:
+        world: The true world.
+        scenario: The task.
+        poses: (A, 5) poses where the robots start.
+
+    Returns:
+        (X, Y) bool.
+    """
+    columns = np.zeros(world.grid.shape[:2], np.bool_)
+    for kind, starts in _starts_of_kinds(world, scenario, poses):
+        passed = _reached_by(world, scenario, kind, starts).any(axis=2)
+        body = kind.robot.body_radius_m / world.grid.voxel_size_m
+        columns |= np.asarray(ndimage.distance_transform_edt(~passed)) <= body + _BESIDE
+    return columns
+
+
+def _starts_of_kinds(world: World, scenario: Scenario, poses: np.ndarray) -> list[tuple[RobotKind, _Starts]]:
+    """Each kind of robot of the team, with the voxels where its robots start."""
+    voxels = np.floor((poses[:, :3] - world.grid.origin_m) / world.grid.voxel_size_m).astype(np.int64)
+    voxels = np.clip(voxels, 0, np.array(world.grid.shape) - 1)
+    kinds = scenario.kinds
+    return [
+        (kind, tuple((int(x), int(y), int(z)) for x, y, z in voxels[first :: len(kinds)]))
+        for first, kind in enumerate(kinds)
+    ]
+
+
 @lru_cache(maxsize=8)
-def _visible_to(
-    world: World, scenario: Scenario, kind: RobotKind, starts: tuple[tuple[int, int, int], ...]
-) -> np.ndarray:
-    """(X, Y, Z) bool, what robots of a kind can see that start in some voxels; not to be changed."""
-    layout = world.layout(scenario, kind)
-    fits = layout.collision_mask == Collision.NONE
+def _reached_by(world: World, scenario: Scenario, kind: RobotKind, starts: _Starts) -> np.ndarray:
+    """(X, Y, Z) bool, where robots of a kind can be that start in some voxels; not to be changed."""
+    fits = world.layout(scenario, kind).collision_mask == Collision.NONE
     layer = scenario.layer_of(kind.robot)
     if layer is not None:
         fits[:, :, :layer] = fits[:, :, layer + 1 :] = False
     labels, _ = connected_components(fits)
     own = {int(labels[x, y, z if layer is None else layer]) for x, y, z in starts} - {0}
-    reached = np.isin(labels, list(own))
+    return np.isin(labels, list(own))
+
+
+@lru_cache(maxsize=8)
+def _visible_to(world: World, scenario: Scenario, kind: RobotKind, starts: _Starts) -> np.ndarray:
+    """(X, Y, Z) bool, what robots of a kind can see that start in some voxels; not to be changed."""
+    layout, reached = world.layout(scenario, kind), _reached_by(world, scenario, kind, starts)
     free = np.logical_not(world.occupied)
     seen = layout.visible & free
     left = np.argwhere(seen & ~reached)
@@ -83,7 +117,7 @@ def _steps(range_: float, flat: bool) -> np.ndarray:
 
 @lean_kernel
 def _look(left, places, free, steps, found):
-    """Note which voxels can be seen from some place.
+    """Note which voxels can be seen from some place: mostly from the one that saw the voxel before.
 
     Args:
         left: (N, 3) int64, the voxels.
@@ -92,24 +126,43 @@ def _look(left, places, free, steps, found):
         steps: (M, 3) int16, from a voxel to places within range, the nearest first.
         found: (N,) bool; filled.
     """
+    if len(steps) == 0:
+        return
+    farthest = np.int64(steps[-1, 0]), np.int64(steps[-1, 1]), np.int64(steps[-1, 2])
+    longest = _squared(farthest)
+    seen_from, any_seen = (np.int64(0), np.int64(0), np.int64(0)), False
     for n in range(len(left)):
+        voxel = left[n, 0], left[n, 1], left[n, 2]
+        if any_seen:
+            step = seen_from[0] - voxel[0], seen_from[1] - voxel[1], seen_from[2] - voxel[2]
+            if _squared(step) <= longest and _is_open(free, voxel, step):
+                found[n] = True
+                continue
         for m in range(len(steps)):
-            x, y, z = left[n, 0] + steps[m, 0], left[n, 1] + steps[m, 1], left[n, 2] + steps[m, 2]
+            step = np.int64(steps[m, 0]), np.int64(steps[m, 1]), np.int64(steps[m, 2])
+            x, y, z = voxel[0] + step[0], voxel[1] + step[1], voxel[2] + step[2]
             if not (0 <= x < free.shape[0] and 0 <= y < free.shape[1] and 0 <= z < free.shape[2]):
                 continue
-            if places[x, y, z] and _is_open(free, left[n], steps[m]):
-                found[n] = True
+            if places[x, y, z] and _is_open(free, voxel, step):
+                found[n] = any_seen = True
+                seen_from = x, y, z
                 break
 
 
 @lean_kernel
+def _squared(step):
+    """The squared length of a step of voxels."""
+    return step[0] * step[0] + step[1] * step[1] + step[2] * step[2]
+
+
+@lean_kernel
 def _is_open(free, start, step):
-    """Whether the line from a voxel's centre to that of the voxel a step (3,) away crosses free voxels only.
+    """Whether the line from a voxel's centre to that of the voxel a step away crosses free voxels only.
 
     Crossing times of the faces along axis i are (2 k + 1)/(2 |step_i|), k = 0, 1, …; they are compared as
     whole numbers, and faces that are crossed together are crossed at once.
     """
-    a, b, c = abs(np.int64(step[0])), abs(np.int64(step[1])), abs(np.int64(step[2]))
+    a, b, c = abs(step[0]), abs(step[1]), abs(step[2])
     i = j = k = np.int64(0)
     while i < a or j < b or k < c:
         tx = (2 * i + 1) * max(b, 1) * max(c, 1) if i < a else np.int64(1 << 62)

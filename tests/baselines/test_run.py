@@ -585,6 +585,7 @@ def test_the_mission_s_end_is_said_by_its_name():
         "CYCLES_UP",
         "SEEN",
         "STOPPED",
+        "EXHAUSTED",
     }
     env = EntropyExploreEnv(with_settings(scripted(BOX), {"max_cycles": 3}))
     run_mission(env, make_strategy("random"), 0)

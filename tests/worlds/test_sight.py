@@ -75,7 +75,7 @@ def test_the_sensors_range_counts():
 def test_lines_of_sight_by_hand():
     """From (0, 0) to (2, 1): through (1, 0) or (1, 1), as x crosses at 1/4 and 3/4, y at 1/2."""
     free = np.ones((3, 2, 1), bool)
-    start, step = np.zeros(3, np.int64), np.array([2, 1, 0], np.int16)
+    start, step = (0, 0, 0), (2, 1, 0)
     assert _is_open(free, start, step)
     for crossed in ((1, 0), (1, 1)):
         free[...] = True

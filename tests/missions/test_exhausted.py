@@ -1,0 +1,114 @@
+"""Missions end where nothing is left that a robot could drive up to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.missions.endings import IDLE_ROUNDS, IDLE_SCANS
+from entropy_explore_env.missions.reset_options import ResetOptions
+from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import SCENARIOS
+from entropy_explore_env.worlds.given import in_given_worlds
+from entropy_explore_env.worlds.world import World
+
+EDGE_M, WIDE, DEEP = 0.1, 23, 9
+EDGES_M = EDGE_M * (WIDE + DEEP + 1)
+STARTS = np.array([[0.35, 0.25, 0.05, 0.0, 0.0], [0.35, 0.65, 0.05, 0.0, 0.0]])
+
+
+def rooms(gap=1, **settings):
+    """Two robots in the left of two rooms; through the gap fits a beam, and no body."""
+    solid = np.zeros((WIDE, DEEP, 1), bool)
+    solid[12] = True
+    solid[12, 4 : 4 + gap] = False
+    world = World(Grid(solid.shape, EDGE_M), solid, "rooms")
+    changes = {"robots": 2, "robot": {"body_radius_m": 0.14}, "ending": {"seen_share": 1.0}}
+    missions = Missions(
+        in_given_worlds(with_settings(SCENARIOS["office"], {**changes, **settings}), [world]), given=(world,)
+    )
+    missions.reset(0, seed=0, options=ResetOptions(STARTS))
+    return missions
+
+
+def idle(missions, scans=IDLE_SCANS, rounds=IDLE_ROUNDS):
+    """Let the team have been idle for so long that its next step, a turn on the spot, asks what is left."""
+    clock, robots = missions.state.missions[0], missions.state.robots[0]
+    clock["idle_scans"] = 2 * scans
+    clock["idle_from_m"] = robots["distance_m"].sum() - 2 * rounds * EDGES_M - 1e-6
+    missions.step(np.zeros((1, 2, 5)), np.zeros((1, 2), np.int64))
+
+
+def know(missions, robot):
+    """Write all that robots can drive up to into a robot's own map."""
+    missions.state.precision[0, robot][missions.state.drivable[0]] = 1e4
+
+
+def test_what_can_be_driven_up_to_is_the_own_room_and_its_walls():
+    drivable = rooms().state.drivable[0].reshape(WIDE, DEEP)
+    assert drivable[:12].all() and not drivable[13:].any()
+
+
+@pytest.mark.parametrize(
+    ("known", "scans", "rounds", "end"),
+    [
+        ([0, 1], IDLE_SCANS, IDLE_ROUNDS, MissionEnd.EXHAUSTED),
+        ([0], IDLE_SCANS, IDLE_ROUNDS, MissionEnd.RUNNING),
+        ([0, 1], IDLE_SCANS - 5, IDLE_ROUNDS, MissionEnd.RUNNING),
+        ([0, 1], IDLE_SCANS, 0.9 * IDLE_ROUNDS, MissionEnd.RUNNING),
+    ],
+)
+def test_all_robots_know_what_is_near_and_have_long_been_idle(known, scans, rounds, end):
+    missions = rooms(channel={"burst": 0})
+    for robot in known:
+        know(missions, robot)
+    missions.state.missions[0]["explored_visible"] = 1000  # more than scans can show: they are idle
+    missions.state.missions[0]["explored_end"] = 2000
+    missions.state.joint_precision[0][:] = 1e4
+    idle(missions, scans, rounds)
+    assert missions.over(0) is end
+    assert not MissionEnd.EXHAUSTED.reached_goal
+
+
+def test_a_robot_that_has_stopped_for_good_need_not_know():
+    missions = rooms(channel={"burst": 0}, faults={"stop": {"at_s": 0.2, "robots": (1,)}})
+    missions.state.joint_precision[0][:] = 1e4
+    missions.state.missions[0]["explored_end"] = 2000
+    know(missions, 0)
+    idle(missions)
+    idle(missions)
+    assert missions.over(0) is MissionEnd.EXHAUSTED
+
+
+def test_a_team_that_has_seen_enough_goes_on_to_share_it():
+    missions = rooms(ending={"seen_share": 1.0, "termination": "shared"}, channel={"burst": 0})
+    missions.state.joint_precision[0][:] = 1e4
+    clock = missions.state.missions[0]
+    clock["explored_visible"] = clock["explored_end"] = clock["visible"]
+    for robot in (0, 1):
+        know(missions, robot)
+    idle(missions)
+    assert missions.over(0) is MissionEnd.RUNNING
+
+
+def test_an_environment_cuts_the_mission_off_and_says_why():
+    solid = np.zeros((WIDE, DEEP, 1), bool)
+    solid[12] = True
+    solid[12, 4] = False
+    world = World(Grid(solid.shape, EDGE_M), solid, "rooms")
+    env = EntropyExploreEnv(
+        "office", world=world, robots=1, robot={"body_radius_m": 0.14}, ending={"seen_share": 1.0}
+    )
+    env.reset(seed=0, options={"starts": STARTS[:1]})
+    for step in range(400):  # to and fro along the wall
+        to = np.array([0.0, 0.13 if step % 2 == 0 else -0.13, 0.0], np.float32)
+        _, _, terminated, truncated, infos = env.step({"robot_0": to})
+        if not env.agents:
+            break
+    assert infos["robot_0"]["end"] == "EXHAUSTED" and truncated["robot_0"] and not terminated["robot_0"]
+    seen, asked = env.missions.state.missions[0][["explored_visible", "explored_end"]]
+    assert 0.5 * asked < seen < asked
