@@ -9,7 +9,7 @@ import numpy as np
 
 from entropy_explore_env.missions.simulation import Missions
 
-FOLLOWS_FROM_WORLD = ("collision", "visible")
+FOLLOWS_FROM_WORLD = ("collision", "visible", "drivable")
 """Arrays that the true world and the scenario determine; digests leave them out."""
 
 
