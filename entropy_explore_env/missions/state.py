@@ -222,7 +222,7 @@ class MissionState(NamedTuple):
     visible: np.ndarray
     """(E, V) bool, what can be seen from where robots can be."""
     drivable: np.ndarray
-    """(E, V) bool, of that what a robot can drive up to; (E, 0) where missions do not end by what was seen."""
+    """(E, V) bool, of that what a robot can drive up to; (E, 0) where missions end by entropy."""
     missions: np.ndarray
     """(E,) MISSION."""
     robots: np.ndarray

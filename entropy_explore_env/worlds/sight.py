@@ -35,10 +35,8 @@ def visible_from(world: World, scenario: Scenario, poses: np.ndarray) -> np.ndar
     Returns:
         (X, Y, Z) bool.
     """
-    seen = [
-        _visible_to(world, scenario, kind, starts) for kind, starts in _starts_of_kinds(world, scenario, poses)
-    ]
-    return np.logical_or.reduce(seen)
+    kinds = _starts_of_kinds(world, scenario, poses)
+    return np.logical_or.reduce([_visible_to(world, scenario, *kind) for kind in kinds])
 
 
 def driven_up_to(world: World, scenario: Scenario, poses: np.ndarray) -> np.ndarray:
