@@ -65,8 +65,6 @@ class Args:
     """Exit with 1 if a goal does not hold."""
     plan: Path | None = None
     """A plan's file, such as warehouse.yaml, to explore as well."""
-    before: Path | None = None
-    """The checkout of another version, for its first step beside ours; it runs with the same Python."""
     out: Path | None = None
     """A Markdown file for the table."""
 
@@ -82,7 +80,7 @@ def main(words: Sequence[str]) -> int:
     for number, (title, job) in enumerate(jobs.items(), start=1):
         print(f"[{number}/{len(jobs)}] {title} …", file=sys.stderr, flush=True)
         effort = QUICK if args.quick else FULL
-        rows += startup_rows(effort, args.before) if job is startup_rows else job(effort)
+        rows += job(effort)
         if job is deciding_rows and args.plan is not None:
             rows += plan_rows(args.plan.stem, str(args.plan), plan, effort)
     about = {**machine(), "command": " ".join(["python -m benchmarks.speed", *words])}
@@ -103,8 +101,6 @@ def checked(args: Args) -> tuple[dict[str, Callable[[Effort], list[Row]]], Any]:
     """
     if args.out is not None and (args.out.is_dir() or not args.out.absolute().parent.is_dir()):
         raise SettingError("out", str(args.out), "a file in a folder that exists")
-    if args.before is not None and not (args.before / "entropy_explore_env" / "__init__.py").is_file():
-        raise SettingError("before", str(args.before), "a checkout, with the folder entropy_explore_env")
     jobs = {title: job for title, job in JOBS.items() if args.only is None or args.only in title}
     if not jobs:
         raise SettingError("only", args.only, "a word of one of: " + "; ".join(JOBS))

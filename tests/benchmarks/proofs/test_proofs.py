@@ -62,7 +62,7 @@ def test_a_case_that_hangs_or_ends_its_process_fails_alone(monkeypatch):
     outcomes = dict(play_cases(hangs_or_crashes, range(4), 4.0))
     assert outcomes == {
         0: Found({"assertions": 1.0}),
-        1: "ran past 4 s",
+        1: "ran past 4 s on the clock",
         2: "its process ended with exit code 3",
         3: Found({"assertions": 1.0}),
     }
