@@ -41,7 +41,7 @@ SOME = {
 }
 STAY = (1.75, 1.75, 1.25, 0.0, 0.0)
 DRIFTING = {"robot": {"localization": SOME}}
-RATES = tuple(f"{what}_per_{part}" for what in ("xy", "z", "yaw") for part in ("m", "rad"))
+RATES = ("xy_per_m", "z_per_m", "yaw_per_m", "yaw_per_rad")
 CHANNELS = ({}, {"delay_s": 0.7}, {"phase_s": 1.5, "repeats": 2})
 
 

@@ -76,10 +76,10 @@ def test_without_landmarks_it_is_what_the_way_adds():
 
 
 def test_a_turn_on_the_spot_counts_by_the_shorter_way_round():
-    le, after = growth(np.zeros((4, 4)), surveyor(), drive(gaze=0.2 - 5.0), 0.0)
+    le, after = growth(np.zeros((4, 4)), surveyor(), drive(gaze=0.2 - 5.0), 2.0)
     turned = 2.0 * math.pi - 5.0
-    assert np.diag(after) == pytest.approx([0.002 * turned, 0.002 * turned, 0.001 * turned, 0.004 * turned])
-    assert le == pytest.approx(math.sqrt(0.005 * turned))
+    assert np.diag(after) == pytest.approx([0.0, 0.0, 0.0, 0.004 * turned])
+    assert le == pytest.approx(math.sqrt(2.0**2 * 0.004 * turned))
 
 
 def test_a_landmark_takes_back_more_than_a_short_way_adds():
