@@ -34,7 +34,6 @@ from entropy_explore_env.explorer.explorer import Explorer
 from entropy_explore_env.explorer.goals import Goal, NoGoal
 from entropy_explore_env.interop.map_files import load_map, save_map
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.channel import Delivery
 from entropy_explore_env.robots.motion import MoveEnd

@@ -43,7 +43,7 @@ from entropy_explore_env.envs.episodes import (
 )
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.refusals import check_bad_actions, check_call_order
-from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import find_scenario

@@ -8,8 +8,8 @@ from typing import Any
 
 from entropy_explore_env.missions.faults import failing
 from entropy_explore_env.missions.localization import pose_errors
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.robots.motion import MoveEnd
 

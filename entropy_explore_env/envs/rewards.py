@@ -20,8 +20,8 @@ import numpy as np
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.poses import driven_metres
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state import MissionEnd
 
 _RUNNING = MissionEnd.RUNNING.code
 

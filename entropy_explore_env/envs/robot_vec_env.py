@@ -19,6 +19,7 @@ from entropy_explore_env.envs.rewards import RewardFunction
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.errors import ActionError, MissingExtraError, SettingError
 from entropy_explore_env.missions.action import action_space
+from entropy_explore_env.missions.records import goals_reached
 from entropy_explore_env.missions.reset_options import (
     ResetOptions,
     batch_options,
@@ -26,7 +27,6 @@ from entropy_explore_env.missions.reset_options import (
     named_options,
 )
 from entropy_explore_env.missions.snapshot import check_array, restore, snapshot
-from entropy_explore_env.missions.state import goals_reached
 from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.validation import check_instance, is_whole

@@ -13,9 +13,9 @@ from entropy_explore_env.envs.infos import robot_infos
 from entropy_explore_env.envs.rewards import RewardFunction, StepRewards
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.missions.action import action_space
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.reset_options import mission_options, named_options
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.view import RobotView, view_of
 from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.reports.painting import FRAMES_PER_S, Painter, check_render_mode, offered_modes

@@ -17,6 +17,7 @@ from entropy_explore_env.errors import CallOrderError, SettingError, one_of
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.faults import failing
 from entropy_explore_env.missions.observation.layout import short_repr
+from entropy_explore_env.missions.records import MissionEnd, goals_reached
 from entropy_explore_env.missions.reset_options import (
     NAMES,
     ResetOptions,
@@ -25,7 +26,6 @@ from entropy_explore_env.missions.reset_options import (
     named_options,
 )
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state import MissionEnd, goals_reached
 from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.painting import FRAMES_PER_S, Painter, check_render_mode, offered_modes

@@ -25,7 +25,7 @@ from entropy_explore_env.explorer.poses import checked_pose, poses_by_number, tu
 from entropy_explore_env.explorer.team import Seat, view_of_seat
 from entropy_explore_env.explorer.workspace import Outlook, Workspace
 from entropy_explore_env.interop.messages import grid_of_message
-from entropy_explore_env.missions.state import HEARD
+from entropy_explore_env.missions.records import HEARD
 from entropy_explore_env.planner.weights import PlannerWeights, shipped_weights
 from entropy_explore_env.randomness import Stream, check_seed, generator
 from entropy_explore_env.robots.motion import MoveEnd

@@ -9,8 +9,8 @@ import numpy as np
 
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.explorer.canvas import Canvas
+from entropy_explore_env.missions.records import WAYPOINTS
 from entropy_explore_env.missions.rules import rules_of
-from entropy_explore_env.missions.state import WAYPOINTS
 from entropy_explore_env.robots.given_scans import aim_at_points, fuse_given
 from entropy_explore_env.robots.motion import driving_time, turning_time
 from entropy_explore_env.robots.navigator import Navigator, new_navigators, plan_path

@@ -14,9 +14,10 @@ from entropy_explore_env.missions.observation.layout import ObservationLayout, c
 from entropy_explore_env.missions.observation.mask import mask_missions
 from entropy_explore_env.missions.observation.observe import Observed, observe_missions
 from entropy_explore_env.missions.proposals import Proposing, propose_missions
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.redecision import CHOICE
 from entropy_explore_env.missions.rules import Rules
-from entropy_explore_env.missions.state import MissionEnd, MissionState
+from entropy_explore_env.missions.state import MissionState
 from entropy_explore_env.missions.threads import Threads
 from entropy_explore_env.missions.tick import step_missions
 from entropy_explore_env.missions.workspace import Workspace, new_workspace

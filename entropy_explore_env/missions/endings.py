@@ -6,8 +6,8 @@ import numpy as np
 
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.faults import all_gone, gone
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.scoring import driven_m, holds_enough
-from entropy_explore_env.missions.state import MissionEnd
 
 _RUNNING, _MAPPED = MissionEnd.RUNNING.code, MissionEnd.MAPPED.code
 _SEEN, _STOPPED = MissionEnd.SEEN.code, MissionEnd.STOPPED.code

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.missions.state import FAULT
+from entropy_explore_env.missions.records import FAULT
 from entropy_explore_env.randomness import Stream, draw_uniform, splitmix_states
 from entropy_explore_env.robots.faults import drop_scan, spoil_scan
 from entropy_explore_env.settings.faults import Outage

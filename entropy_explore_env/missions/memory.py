@@ -79,8 +79,8 @@ def memory_needs(scenario: Scenario, batch: Batch) -> list[Need]:
     """
     missions, cells = batch.missions, math.prod(overview_shape(scenario) or (0,))
     sizes = {
-        name: math.prod(shape) * kind.itemsize
-        for name, (shape, kind) in state_arrays(scenario, missions, cells).items()
+        name: math.prod(array.shape) * array.dtype.itemsize
+        for name, array in state_arrays(scenario, missions, cells).items()
     }
     delayed = sum(size for name, size in sizes.items() if name.startswith("in_flight"))
     phases = sum(size for name, size in sizes.items() if name.startswith("phase"))

@@ -12,9 +12,9 @@ import numpy as np
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.localization import estimate_in
 from entropy_explore_env.missions.poses import to_grid_units, within_grid
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.redecision import decide, note_braking, note_change
 from entropy_explore_env.missions.rules import ActionSet
-from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.navigator import plan_path
 

@@ -16,8 +16,9 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.localization import believed_pose, estimate_in, pose_variance
 from entropy_explore_env.missions.observation.own_state import entropy_left
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.silence import silent_since
-from entropy_explore_env.missions.state import MissionEnd, MissionState
+from entropy_explore_env.missions.state import MissionState
 from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
 from entropy_explore_env.planner.features import write_context, write_features, write_overlaps
 from entropy_explore_env.planner.model import Situation

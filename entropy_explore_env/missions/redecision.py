@@ -32,7 +32,7 @@ from entropy_explore_env.missions.poses import (
     share_left,
     speed_at,
 )
-from entropy_explore_env.missions.state import WAYPOINTS
+from entropy_explore_env.missions.records import WAYPOINTS
 from entropy_explore_env.robots.localization import believed_point
 
 CHOICE = record_type(

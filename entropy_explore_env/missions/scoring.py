@@ -12,7 +12,7 @@ from entropy_explore_env.belief.map_update import fuse_ray
 from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.poses import share_left
-from entropy_explore_env.missions.state import PROGRESS, SEEN_MARKS
+from entropy_explore_env.missions.records import PROGRESS, SEEN_MARKS
 
 _NOTHING = int(Return.NOTHING)
 _ROUNDING = 1e-9

@@ -14,10 +14,11 @@ from entropy_explore_env.missions.compiled_step import Arrays, CompiledStep
 from entropy_explore_env.missions.episode import FixedWorlds, Start, draw_start, fill_start
 from entropy_explore_env.missions.memory import Batch, check_memory
 from entropy_explore_env.missions.observation.layout import ObservationLayout
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.reset_options import DRAWN, ResetOptions
 from entropy_explore_env.missions.rules import rules_of
-from entropy_explore_env.missions.state import MissionEnd, MissionState, new_state
-from entropy_explore_env.missions.state_ranges import FROM_WORLD, check_ranges
+from entropy_explore_env.missions.state import FROM_WORLD, MissionState, new_state
+from entropy_explore_env.missions.state_ranges import check_ranges
 from entropy_explore_env.randomness import Stream, check_seed, generator
 from entropy_explore_env.robots.range_sensor import true_coverage
 from entropy_explore_env.settings.grid import Grid

@@ -9,7 +9,8 @@ import numpy as np
 from entropy_explore_env.errors import RecordError
 from entropy_explore_env.missions.reset_options import ResetOptions, mission_options
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state_ranges import FROM_WORLD, check_ranges
+from entropy_explore_env.missions.state import FROM_WORLD
+from entropy_explore_env.missions.state_ranges import check_ranges
 from entropy_explore_env.worlds.load import world_bytes, world_from_bytes
 from entropy_explore_env.worlds.world import World
 

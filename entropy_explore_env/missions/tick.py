@@ -34,18 +34,12 @@ from entropy_explore_env.missions.localization import estimate_of, localization_
 from entropy_explore_env.missions.messages import Maps, Team, Tracer, announce, receive
 from entropy_explore_env.missions.own_maps import summaries_of
 from entropy_explore_env.missions.phases import broadcast_all
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.redecision import decide, note_braking, note_change
 from entropy_explore_env.missions.reward import reward_robots
 from entropy_explore_env.missions.scanning import scan_and_share
 from entropy_explore_env.missions.scoring import note_progress
-from entropy_explore_env.missions.state import (
-    Beliefs,
-    InFlight,
-    JointMap,
-    LatestScans,
-    MissionEnd,
-    PhaseBuffers,
-)
+from entropy_explore_env.missions.state import Beliefs, InFlight, JointMap, LatestScans, PhaseBuffers
 from entropy_explore_env.missions.summaries import receive_summary
 from entropy_explore_env.robots.channel import Air
 from entropy_explore_env.robots.range_sensor import sensor_of

@@ -10,7 +10,7 @@ import numpy as np
 
 from entropy_explore_env.belief.map_update import Scan
 from entropy_explore_env.belief.raycast import Crossing, longest_crossing
-from entropy_explore_env.missions.state import WAYPOINTS
+from entropy_explore_env.missions.records import WAYPOINTS
 from entropy_explore_env.robots.map_summary import new_summary_tree
 from entropy_explore_env.robots.map_tree import Tree
 from entropy_explore_env.robots.navigator import Navigator, footprints

@@ -9,6 +9,20 @@ import enum
 
 from entropy_explore_env.compilation.kernels import record_type
 from entropy_explore_env.planner.thresholds import REMEMBERED, REMEMBERED_EDGES
+from entropy_explore_env.robots.ranges import (
+    COUNT,
+    FAR_GRID_PLACE,
+    FAR_GRID_POSE,
+    FAR_POSE,
+    FLAG,
+    GRID_PLACE,
+    GRID_POSE,
+    HUGE,
+    POSITIVE,
+    SIGNED,
+    Values,
+    ranged_type,
+)
 
 
 class Kind(enum.IntEnum):
@@ -70,12 +84,12 @@ OPTION = record_type(
 )
 """A viewpoint of the pool out of which candidates are selected."""
 
-CANDIDATE = record_type(
+CANDIDATE = ranged_type(
     [
-        ("viewpoint", "f8", (5,)),  # map frame, metres; of those that are none, the first one's
-        ("goal", "f8", (5,)),  # the far viewpoint to which it leads, else itself
-        ("bits", "f8"),  # that a scan at the viewpoint should bring
-        ("kind", "i8"),  # a Kind
+        ("viewpoint", "f8", FAR_POSE, (5,)),  # map frame, metres; of those that are none, the first one's
+        ("goal", "f8", GRID_POSE, (5,)),  # the far viewpoint to which it leads, else itself
+        ("bits", "f8", POSITIVE),  # that a scan at the viewpoint should bring
+        ("kind", "i8", Values(0, max(Kind))),
     ],
 )
 """A viewpoint that is proposed to a robot."""
@@ -95,28 +109,49 @@ VIEW = record_type(
 )
 """What is expected to be seen from a candidate, or from the far place to which it leads."""
 
-EXPERIENCE = record_type(
+_WORTH = Values(0.0, HUGE)
+
+EXPERIENCE = ranged_type(
     [
-        ("candidates_rng", "u8", (1,)),  # random state of its candidates
-        ("most_bits", "f8"),  # most bits ever expected of a viewpoint
-        ("decided_s", "f8"),  # when it last decided at a stop
-        ("decided_bits", "f8"),  # what its own scans had brought by then
-        ("exponent", "f8"),  # c of bits / s^c, now
-        ("going", "?"),  # whether it is on its way to a far place
-        ("goal", "f8", (5,)),  # that far place
-        ("far_value", "f8"),  # what the best far place was worth when they were last evaluated
-        ("looked_far", "?"),  # whether they ever were, with this exponent
-        ("far_at", "f8", (3,)),  # where the robot was then
-        ("patience", "i8"),  # decisions until far places are evaluated again on the same spot
-        ("stood_at", "f8", (3,)),  # where it stopped last, but for steps of less than a voxel edge
-        ("low_gain_scans", "i8"),  # in a row, taken there; once they are DEPLETED_SCANS, taken anywhere
-        ("blocked", "i8"),  # decisions during which it keeps clear of teammates
-        ("edges", "i8"),  # drives that the end of the ground cut short
-        ("edge_at", "f8", (REMEMBERED_EDGES, 3)),  # places just beyond it, the last of these drives
-        ("failures", "i8"),  # number of viewpoints that failed, of which the last are kept
-        ("failed", "f8", (REMEMBERED, 5)),  # viewpoints that did not bring what was expected
-        ("share", "f8", (REMEMBERED,)),  # of the expected bits that came; 0 = not reached, 1 = forgotten
-        ("forget_at", "f8", (REMEMBERED,)),  # distance from it at which it is forgotten
+        ("candidates_rng", "u8", None, (1,)),  # random state of its candidates
+        ("most_bits", "f8", _WORTH),  # most bits ever expected of a viewpoint
+        ("decided_s", "f8", POSITIVE),  # when it last decided at a stop
+        ("decided_bits", "f8", POSITIVE),  # what its own scans had brought by then
+        ("exponent", "f8", _WORTH),  # c of bits / s^c, now
+        ("going", "?", FLAG),  # whether it is on its way to a far place
+        ("goal", "f8", GRID_POSE, (5,)),  # that far place
+        ("far_value", "f8", _WORTH),  # what the best far place was worth when they were last evaluated
+        ("looked_far", "?", FLAG),  # whether they ever were, with this exponent
+        ("far_at", "f8", GRID_PLACE, (3,)),  # where the robot was then
+        ("patience", "i8", SIGNED),  # decisions until far places are evaluated again on the same spot
+        (
+            "stood_at",
+            "f8",
+            GRID_PLACE,
+            (3,),
+        ),  # where it stopped last, but for steps of less than a voxel edge
+        (
+            "low_gain_scans",
+            "i8",
+            COUNT,
+        ),  # in a row, taken there; once they are DEPLETED_SCANS, taken anywhere
+        ("blocked", "i8", COUNT),  # decisions during which it keeps clear of teammates
+        ("edges", "i8", COUNT),  # drives that the end of the ground cut short
+        (
+            "edge_at",
+            "f8",
+            FAR_GRID_PLACE,
+            (REMEMBERED_EDGES, 3),
+        ),  # places just beyond it, the last of these drives
+        ("failures", "i8", COUNT),  # number of viewpoints that failed, of which the last are kept
+        ("failed", "f8", FAR_GRID_POSE, (REMEMBERED, 5)),  # viewpoints that did not bring what was expected
+        (
+            "share",
+            "f8",
+            Values(0.0, 1.0),
+            (REMEMBERED,),
+        ),  # of the expected bits that came; 0 = not reached, 1 = forgotten
+        ("forget_at", "f8", POSITIVE, (REMEMBERED,)),  # distance from it at which it is forgotten
     ],
 )
 """What a robot remembers from one decision to the next."""

@@ -11,8 +11,8 @@ import numpy as np
 from entropy_explore_env.missions.faults import fault_counts
 from entropy_explore_env.missions.localization import localization_figures
 from entropy_explore_env.missions.poses import driven_metres
+from entropy_explore_env.missions.records import COUNTED, SEEN_MARKS
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state import COUNTED, SEEN_MARKS
 from entropy_explore_env.robots.range_sensor import (
     Return,
     Scene,

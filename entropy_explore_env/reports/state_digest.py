@@ -8,13 +8,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from entropy_explore_env.missions.simulation import Missions
-
-FOLLOWS_FROM_WORLD = ("collision", "visible", "drivable")
-"""Arrays that the true world and the scenario determine; digests leave them out."""
+from entropy_explore_env.missions.state import FROM_WORLD
 
 
 def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
-    """Return all values of a mission's state, by `array` or `array.field`.
+    """Return the values of a mission's state, but for what follows from its world, by array and field.
 
     Args:
         missions: Missions of which one is read.
@@ -25,7 +23,7 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
     """
     values: dict[str, np.ndarray] = {}
     for name, array in missions.state._asdict().items():
-        if name in FOLLOWS_FROM_WORLD:
+        if name in FROM_WORLD:
             continue
         if array.dtype.names is None:
             values[name] = array[mission, ...]

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.robots.pose_covariance import (
     gain_along,
     keep_positive,
@@ -26,16 +26,25 @@ from entropy_explore_env.robots.pose_covariance import (
     spread_yaw_error,
     within_half_turn,
 )
+from entropy_explore_env.robots.ranges import (
+    COUNT,
+    FLAG,
+    PLACE_OR_ZERO,
+    SIGNED,
+    SPREAD,
+    Values,
+    ranged_type,
+)
 
-LANDMARK = record_type(
+LANDMARK = ranged_type(
     [
-        ("place", "f8", (3,)),  # in the world
-        ("believed", "f8", (3,)),  # where the robot saw it first
-        ("seen_from", "f8", (3,)),  # where it believed to be then
-        ("covariance", "f8", (4, 4)),  # of the pose then
-        ("score", "f8"),  # eq. 17
-        ("sightings", "i8"),  # after the first one
-        ("used", "?"),
+        ("place", "f8", PLACE_OR_ZERO, (3,)),  # in the world
+        ("believed", "f8", SIGNED, (3,)),  # where the robot saw it first
+        ("seen_from", "f8", PLACE_OR_ZERO, (3,)),  # where it believed to be then
+        ("covariance", "f8", SPREAD, (4, 4)),  # of the pose then
+        ("score", "f8", Values(0.0, 2.0)),  # eq. 17
+        ("sightings", "i8", COUNT),  # after the first one
+        ("used", "?", FLAG),
     ],
 )
 """A landmark of a robot's own map, or a free place for one."""

@@ -20,6 +20,17 @@ from entropy_explore_env.robots.pose_covariance import (
     turn_between,
     within_half_turn,
 )
+from entropy_explore_env.robots.ranges import (
+    ANGLE,
+    COUNT,
+    HUGE,
+    MOST,
+    PLACE,
+    POSE,
+    SPREAD,
+    Values,
+    ranged_type,
+)
 
 LOCALIZATION_PARAMS = record_type(
     [
@@ -41,21 +52,36 @@ LOCALIZATION_PARAMS = record_type(
 )
 """How a robot localises itself, in the units of `settings.localization`, standard deviations squared."""
 
-ESTIMATE = record_type(
+ESTIMATE = ranged_type(
     [
-        ("place", "f8", (3,)),  # where the robot truly was at the latest event
-        ("yaw", "f8"),  # its true yaw then
-        ("driven_m", "f8"),  # what it had driven by then
-        ("error", "f8", (4,)),  # estimate less truth: x, y, z, yaw
-        ("covariance", "f8", (4, 4)),  # of x, y, z, yaw, as the robot holds it to be
-        ("packed", "f8", (10,)),  # the covariance at its latest scan, as batches of measurements carry it
-        ("scan_pose", "f8", (5,)),  # where it believes to have taken its latest scan: x, y, z, yaw, pitch
-        ("drift_rng", "u8", (1,)),  # random state of drift
-        ("sighting_rng", "u8", (1,)),  # of errors of sightings, so that fiducials do not change the drift
+        ("place", "f8", PLACE, (3,)),  # where the robot truly was at the latest event
+        ("yaw", "f8", ANGLE),  # its true yaw then
+        ("driven_m", "f8", Values(-1.0, MOST)),  # what it had driven by then
+        ("error", "f8", Values("error_low", "error_high"), (4,)),  # estimate less truth: x, y, z, yaw
+        ("covariance", "f8", SPREAD, (4, 4)),  # of x, y, z, yaw, as the robot holds it to be
+        (
+            "packed",
+            "f8",
+            SPREAD,
+            (10,),
+        ),  # the covariance at its latest scan, as batches of measurements carry it
+        (
+            "scan_pose",
+            "f8",
+            POSE,
+            (5,),
+        ),  # where it believes to have taken its latest scan: x, y, z, yaw, pitch
+        ("drift_rng", "u8", None, (1,)),  # random state of drift
+        (
+            "sighting_rng",
+            "u8",
+            None,
+            (1,),
+        ),  # of errors of sightings: fiducials do not change the drift
         # counted from the mission's start
-        ("sightings", "i8"),
-        ("squared_m2", "f8"),  # squared error of the place, summed over scans
-        ("squared_rad2", "f8"),  # the same of the yaw
+        ("sightings", "i8", COUNT),
+        ("squared_m2", "f8", Values(0.0, HUGE)),  # squared error of the place, summed over scans
+        ("squared_rad2", "f8", Values(0.0, HUGE)),  # the same of the yaw
     ],
 )
 """What a robot believes of its pose, and how wrong that is: the robot itself sees no error."""

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.compilation.kernels import lean_kernel, record_type
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.errors import RecordError, SettingError
 from entropy_explore_env.robots.map_tree import (
     Tree,
@@ -23,6 +23,7 @@ from entropy_explore_env.robots.map_tree import (
     write_tree,
 )
 from entropy_explore_env.robots.range_coder import begin_reading, begin_writing, end_writing
+from entropy_explore_env.robots.ranges import COUNT, PAST, Values, ranged_type
 from entropy_explore_env.settings.validation import is_number
 
 _MAGIC = np.uint8(0xE5)
@@ -35,21 +36,21 @@ _BITS_PER_NODE, _BITS_PER_LEAF = 2, 16
 """Of a tree that is not packed: a kind, and codes of mean and σ."""
 
 
-SUMMARY = record_type(
+SUMMARY = ranged_type(
     [
-        ("sent_s", "f8"),  # when the robot sent its latest summary; 0 = it has not
-        ("sent", "i8"),  # how many it has sent
+        ("sent_s", "f8", PAST),  # when the robot sent its latest summary; 0 = it has not
+        ("sent", "i8", COUNT),  # how many it has sent
         # the box in which it has measured since then
-        ("low", "i8", (3,)),  # its first voxel
-        ("high", "i8", (3,)),  # one past its last one; zeros = it has measured nothing
+        ("low", "i8", Values(0, "size"), (3,)),  # its first voxel
+        ("high", "i8", Values(0, "size"), (3,)),  # one past its last one; zeros = it has measured nothing
     ],
 )
 """What a robot of a mission keeps for its next summary, beside the map."""
 
-PARCEL = record_type(
+PARCEL = ranged_type(
     [
-        ("place", "i8"),  # of the summary that a delayed message carries
-        ("bytes", "i8"),  # its length; 0 = it carries none
+        ("place", "i8", Values(0, "last_place")),  # of the summary that a delayed message carries
+        ("bytes", "i8", Values(0, "summary_bytes")),  # its length; 0 = it carries none
     ],
 )
 """What a delayed message of a mission carries."""

@@ -25,7 +25,7 @@ from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import ALIASES, STRATEGIES, make_strategy
 from benchmarks.proofs.world_samples import pgm
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.mission_record import load_record
 from entropy_explore_env.settings.changes import with_settings

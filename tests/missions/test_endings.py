@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.records import MissionEnd
 from tests.reference.scenes import free_box, started
 
 

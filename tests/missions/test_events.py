@@ -12,8 +12,8 @@ import pytest
 
 from entropy_explore_env.missions.events import events_handled, next_event
 from entropy_explore_env.missions.faults import TeamFaults
+from entropy_explore_env.missions.records import FAULT, MESSAGE, PHASES, ROBOT
 from entropy_explore_env.missions.rules import PARAMS
-from entropy_explore_env.missions.state import FAULT, MESSAGE, PHASES, ROBOT
 from entropy_explore_env.robots.faults import FAULT_PARAMS
 from tests.reference.scenes import free_box, started
 

@@ -7,9 +7,9 @@ import pytest
 
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.endings import IDLE_ROUNDS, IDLE_SCANS
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.reset_options import ResetOptions
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import SCENARIOS

@@ -14,9 +14,9 @@ from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.errors import RecordError
 from entropy_explore_env.missions.faults import draw_faults
 from entropy_explore_env.missions.poses import pose_at
+from entropy_explore_env.missions.records import FAULT, MissionEnd
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
-from entropy_explore_env.missions.state import FAULT, MissionEnd
 from entropy_explore_env.randomness import Stream, draw_uniform
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.state_digest import state_digest

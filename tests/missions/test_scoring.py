@@ -10,8 +10,8 @@ from hypothesis import given
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.missions.poses import driven_metres
+from entropy_explore_env.missions.records import PROGRESS, MissionEnd
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state import PROGRESS, MissionEnd
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.settings.grid import Grid

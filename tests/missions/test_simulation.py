@@ -13,8 +13,8 @@ from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.errors import ActionError, CallOrderError, SettingError, WorldError
 from entropy_explore_env.missions.poses import pose_at
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.state import MissionEnd
 from entropy_explore_env.missions.tick import step_missions
 from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.settings.changes import with_settings

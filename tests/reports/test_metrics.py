@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from entropy_explore_env.missions.state import COUNTED, MissionEnd
+from entropy_explore_env.missions.records import COUNTED, MissionEnd
 from entropy_explore_env.reports.metrics import information_floor, joint_figures, mission_figures
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import ROOM

@@ -12,7 +12,7 @@ from baselines.strategies import make_strategy
 from baselines.strategies.protocol import random_viewpoint
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import ActionError
-from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import BOX

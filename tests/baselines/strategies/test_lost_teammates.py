@@ -9,7 +9,7 @@ from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
 from baselines.suites.faults import STRATEGIES
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import OFFICE

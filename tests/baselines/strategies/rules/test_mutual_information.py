@@ -13,7 +13,7 @@ from baselines.strategies.mutual_information.neighbourhood import MutualInformat
 from baselines.strategies.rules.mutual_information import MutualInformation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import BOX, LAB

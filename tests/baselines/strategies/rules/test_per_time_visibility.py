@@ -21,7 +21,7 @@ from entropy_explore_env.frontiers.blocks import COVERED, NONE
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.frontiers.terrain_frontiers import TerrainFrontiers
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
-from entropy_explore_env.missions.state import MissionEnd
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.settings.changes import with_settings
