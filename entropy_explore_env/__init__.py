@@ -33,6 +33,7 @@ from entropy_explore_env.errors import (
 from entropy_explore_env.explorer.explorer import Explorer
 from entropy_explore_env.explorer.goals import Goal, NoGoal
 from entropy_explore_env.interop.map_files import load_map, save_map
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.robots.channel import Delivery
