@@ -14,17 +14,8 @@ from entropy_explore_env.planner.tour import SharedTour, Tour
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import OFFICE, find_scenario
-from tests.planner.scenes import cell, mate, random_plan, scene_of, small_plan, with_mates
-from tests.reference import explorers as reference
+from tests.planner.scenes import cell, corridor, mate, random_plan, scene_of, small_plan, with_mates
 from tests.reference.scenes import drawn, seeds
-
-
-def corridor(length=31):
-    """A corridor, known in the middle and open at both ends."""
-    plan = np.full((length, 3), reference.WALL, np.int8)
-    plan[1:-1, 1] = reference.FREE
-    plan[0, 1] = plan[-1, 1] = reference.UNKNOWN
-    return plan
 
 
 def picked(plan, robot, *mates):
@@ -36,13 +27,13 @@ def picked(plan, robot, *mates):
 def test_a_robot_leaves_to_a_teammate_what_that_is_nearer_to_by_hand():
     plan = corridor()
     assert picked(plan, (8, 1)) == (1, 1)
-    assert picked(plan, (8, 1), mate((4, 1), (1, 1))) == (29, 1)
-    assert picked(plan, (3, 1), mate((20, 1), (29, 1))) == (1, 1)
+    assert picked(plan, (8, 1), mate((4, 1), (1, 1))) == (27, 1)
+    assert picked(plan, (3, 1), mate((20, 1), (27, 1))) == (1, 1)
 
 
 def test_where_teammates_are_nearer_to_all_a_robot_helps_by_hand():
     plan = corridor()
-    assert picked(plan, (8, 1), mate((4, 1), (1, 1)), mate((20, 1), (29, 1))) == (1, 1)
+    assert picked(plan, (8, 1), mate((4, 1), (1, 1)), mate((20, 1), (27, 1))) == (1, 1)
 
 
 @given(st.sampled_from([(17, 11), (31, 14)]), seeds)

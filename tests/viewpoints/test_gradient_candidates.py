@@ -108,22 +108,6 @@ def test_a_voxel_at_the_edge_of_reach_is_a_candidate_and_one_beyond_is_not(offse
     assert found is None or found[0] != target
 
 
-def test_reach_ends_at_the_workspace():
-    for corner in ((0.5, 0.5, 0.5), (6.5, 10.5, 4.5), (0.01, 10.99, 4.99)):
-        found = steepest(*slope(1.0, 0.5, 0.25), corner, 50.0)
-        assert found is not None and all(0 <= index < n for index, n in zip(found[0], SIZE, strict=True))
-
-
-def test_along_an_axis_whose_first_voxel_it_is_nothing_is_steep():
-    everywhere = slope(1.0, 2.0, 4.0)
-    assert steepest(*everywhere, (0.5, 0.5, 0.5), 0.0) is None
-    for voxel, expected in (((0, 3, 2), (0, 2, 4)), ((3, 0, 2), (1, 0, 4)), ((3, 3, 0), (1, 2, 0))):
-        found = steepest(*everywhere, np.asarray(voxel) + 0.5, 0.0)
-        assert found is not None and found[0] == voxel
-        length = math.hypot(*expected)
-        assert rocha04.gaze(*found[1]) == pytest.approx([part / length for part in expected], abs=1e-6)
-
-
 @pytest.mark.parametrize("reach", [1.0, 2.0, 3.2, 20.0])
 @pytest.mark.parametrize("along", [(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 2.0), (1.0, 1.0, -1.0)])
 def test_of_equal_voxels_the_first_in_c_order_is_taken(reach, along):
@@ -134,19 +118,6 @@ def test_of_equal_voxels_the_first_in_c_order_is_taken(reach, along):
         if all(index > 0 for index, part in zip(voxel, along, strict=True) if part)
     ]
     assert found is not None and found[0] == steep[0]
-
-
-def test_a_voxel_that_is_believed_covered_counts_less():
-    """Score ‖∇h‖ (1 - μ): 2 bits at 0.8 lose against 1 bit at 0.5, and win at 0.4."""
-    precision = np.ones(SIZE)
-    precision[4:] = 4.0**-1  # 1 bit at x = 4
-    precision[5:] = 4.0**-3  # 2 bits at x = 5
-    for mean_at_5, expected in ((0.8, 4), (0.4, 5)):
-        mean = np.full(SIZE, 0.5)
-        mean[5] = mean_at_5
-        found = steepest(mean, precision, (4.5, 5.5, 2.5), 1.0)
-        assert found is not None and found[0][0] == expected
-    assert steepest(np.ones(SIZE), precision, MIDDLE, 3.0) is None
 
 
 # --- the gaze: p̂ = [cosθ cosφ, sinθ cosφ, -sinφ], yaw counter-clockwise, pitch downwards
@@ -189,24 +160,3 @@ def test_a_robot_that_looks_straight_up_moves_up_and_sidewards(yaw):
     assert found is not None and rocha04.gaze(*found[1]) == pytest.approx(left, abs=1e-5)
     found = steepest(*slope(ahead[0], ahead[1], 1.0), MIDDLE, 1.0, yaw, -math.pi / 2, projected=True)
     assert found is not None and rocha04.gaze(*found[1]) == pytest.approx((0, 0, 1), abs=1e-5)
-
-
-def test_what_lies_off_the_plane_is_less_reachable():
-    """Everywhere the same slope: ρ is 1 in the plane and 0 right above; the first of ρ = 1 is taken."""
-    field = slope(1.0, 0.0, 0.0)
-    found = steepest(*field, MIDDLE, 1.0, projected=True)
-    assert found is not None and found[0] == (2, 5, 2)
-    mean = np.ones(SIZE)
-    mean[3, 5, 3], mean[3, 4, 2] = 0.0, 0.9  # right above, free; to the right, hardly
-    found = steepest(mean, field[1], MIDDLE, 1.0, projected=True)
-    assert found is not None and found[0] == (3, 4, 2)
-    found = steepest(mean, field[1], MIDDLE, 1.0, projected=False)
-    assert found is not None and found[0] == (3, 5, 3)
-
-
-def test_where_the_robot_stands_all_is_reachable():
-    """ρ = 1 at distance 0 (eq. 40)."""
-    mean = np.full(SIZE, 0.5)
-    mean[3, 5, 2] = 0.4
-    found = steepest(mean, slope(1.0)[1], MIDDLE, 1.0, projected=True)
-    assert found is not None and found[0] == (3, 5, 2)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -111,40 +109,6 @@ def test_planar_robots_stay_level_and_in_their_plane(changes, motion_plane):
     assert (missions.state.robots[0]["goal"][:, 4] == 0.0).all()
 
 
-# --- a strategy sees a RobotView and nothing else
-
-
-class Watched:
-    """Passes on the fields of a RobotView, notes which were read, and has nothing else."""
-
-    def __init__(self, view: RobotView) -> None:
-        object.__setattr__(self, "seen", set())
-        object.__setattr__(self, "_view", view)
-
-    def __getattr__(self, name: str):
-        self.seen.add(name)
-        return getattr(object.__getattribute__(self, "_view"), name)
-
-    def __setattr__(self, name: str, value: object) -> None:
-        raise AssertionError(f"a strategy wrote {name}")
-
-
-@pytest.mark.parametrize("wandering", [False, True])
-def test_it_reads_the_public_fields_of_its_view_and_changes_nothing(wandering):
-    missions = started(free_box(robots=3, world="furnished"), seed=2)
-    wander(missions, 20, 0)
-    missions.state.robots[0]["move_end"] = (MoveEnd.TEAMMATE if wandering else MoveEnd.ARRIVED).code
-    before = [array.tobytes() for array in missions.state]
-    views = [view_of(missions, 0, robot) for robot in range(3)]
-    watched = [Watched(view) for view in views]
-    for view, choice in zip(watched, map(chosen, watched), strict=True):  # type: ignore[arg-type]
-        assert choice.shape == (5,)
-        derived = {"kind", "planar", "level"}
-        assert view.seen <= {field.name for field in dataclasses.fields(RobotView)} | derived
-        assert "teammates" not in view.seen  # Rocha04's rule does not look at them
-    assert [array.tobytes() for array in missions.state] == before
-
-
 def test_what_a_robot_cannot_know_does_not_change_its_choice():
     missions = started(free_box(robots=2, world="furnished"), seed=2)
     wander(missions, 20, 0)
@@ -157,15 +121,6 @@ def test_what_a_robot_cannot_know_does_not_change_its_choice():
     assert chosen(view_of(missions, 0, 0)).tolist() == before.tolist()
     missions.mean[0, 0], missions.precision[0, 0] = random_belief(SIZE, 1)
     assert chosen(view_of(missions, 0, 0)).tolist() != before.tolist()
-
-
-@pytest.mark.parametrize("name", ["mean", "precision"])
-def test_a_strategy_that_writes_into_its_view_is_stopped(name):
-    view = view_of(started(free_box(robots=1)), 0, 0)
-    with pytest.raises(ValueError, match="read-only"):
-        getattr(view, name)[0, 0, 0] = 1.0
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        setattr(view, name, np.zeros(SIZE))
 
 
 def test_reach_in_metres_is_not_lost_to_rounding():

@@ -257,16 +257,6 @@ def test_missions_in_a_box_end(name):
     assert figures["finished"], figures["end_reason"]
 
 
-@pytest.mark.parametrize("name", SETTINGS)
-def test_the_same_seed_gives_the_same_mission(name):
-    def figures():
-        env = EntropyExploreEnv(with_settings(scripted(BOX), {"robots": 3, "time_limit_s": 60.0}))
-        run_mission(env, PerTimeVisibility(SETTINGS[name]), 4)
-        return mission_figures(env.missions, 0)
-
-    assert figures() == figures()
-
-
 def test_bodies_and_a_short_reach_explore_an_office():
     """The named scenario as it is: bodies of 0.3 m, 5 m of reach, a narrow channel."""
     env = EntropyExploreEnv(

@@ -16,7 +16,6 @@ from baselines.strategies.voronoi.controls import (
     nearest_uncertain,
     neighbours,
     projected_centroid,
-    step_is_free,
 )
 from entropy_explore_env.belief.paths.geodesic_cells import (
     UNREACHED,
@@ -134,14 +133,6 @@ def test_neighbours_are_those_to_which_no_step_cuts_a_corner(size, seed):
                     place[axis] += steps[axis]
                     wanted &= bool(free[tuple(place)])
             assert (there in found) == wanted
-
-
-def test_no_step_cuts_a_corner():
-    free = np.ones((2, 2, 1), bool)
-    assert neighbours(free, 0) == [1, 2, 3]
-    free[0, 1] = False
-    assert neighbours(free, 0) == [2]
-    assert not step_is_free(free, 0, 3) and not step_is_free(np.ones((3, 1, 1), bool), 0, 2)
 
 
 def test_gradient_search_walks_to_the_middle_of_a_corridor():
