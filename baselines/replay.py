@@ -1,5 +1,7 @@
 """Run a recorded mission again, bit for bit: `python -m baselines.replay mission.npz --out results/again`.
 
+Of a bag of ROS it plays the maps through a strategy: `python -m baselines.replay BAG --strategy best`.
+
 Takes the record that `baselines.run --record FILE` (or `--out`) wrote, gives the environment the same
 commands, compares the state at the end with the record's digest, and draws the mission anew. Exit code 1
 where the end differs: another version of the library, or another machine's arithmetic. A record holds its
@@ -18,6 +20,7 @@ from typing import Annotated
 import numpy as np
 
 from baselines.cli.arguments import parse, run_command
+from baselines.cli.bag_replay import is_bag, replay_bag
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
 from baselines.cli.options import Also, Mark
 from baselines.cli.progress import progress_bar
@@ -58,6 +61,8 @@ class Args:
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
+    if is_bag(words):
+        return replay_bag(words)
     _refuse_settings(words)
     args = parse(Args, words, description=__doc__)
     allow_read_memory(args.read_memory_mib)

@@ -16,6 +16,7 @@ from baselines.cli.arguments import make_folder, print_json
 from baselines.cli.progress import named, print_table
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.interop.bag_writer import BagWriter
 from entropy_explore_env.interop.map_files import save_map
 from entropy_explore_env.interop.team_maps import joint_map
 from entropy_explore_env.reports.animation import Film, animate, write_video
@@ -43,6 +44,8 @@ class Outputs:
     """File for a video of the mission (extra viewer)."""
     rerun: Path | None = None
     """File for a recording, an .rrd that Rerun's viewer opens (extra viewer)."""
+    bag: Path | None = None
+    """Folder for a ROS 2 bag of the mission, which must not exist (extra ros)."""
     truth: bool = False
     """Show the true world beside the map in mission.png; needs --out."""
     json: bool = False
@@ -76,9 +79,13 @@ class Wanted:
         if self.outputs.truth and self.out is None:
             raise SettingError("truth", True, "--out beside it")
         mp4, rerun = self.outputs.mp4, self.outputs.rerun
-        for package, module, file in (("av", "av", mp4), ("rerun-sdk", "rerun", rerun)):
+        needed = (("av", "av", mp4, "viewer"), ("rerun-sdk", "rerun", rerun, "viewer"))
+        needed = (*needed, ("rosbags", "rosbags", self.outputs.bag, "ros"))
+        for package, module, file, extra in needed:
             if file is not None and importlib.util.find_spec(module) is None:
-                raise MissingExtraError(package, "viewer")
+                raise MissingExtraError(package, extra)
+        if self.outputs.bag is not None and self.outputs.bag.exists():
+            raise SettingError("bag", str(self.outputs.bag), "a folder that does not exist yet")
         if self.out is not None:
             make_folder("out", self.out)
         files = {"gif": self.outputs.gif, "mp4": mp4, "record": self.record, "rerun": rerun}
@@ -105,6 +112,7 @@ class MissionLog:
         }
         self._films = {kind: Film(most) for kind, most in films.items() if most}
         self._rerun: RerunView | None = None
+        self._bag: BagWriter | None = None
         self._stack = ExitStack()
         self._started = False
 
@@ -120,6 +128,9 @@ class MissionLog:
         self.recorder, self.commands = Recorder(env.missions), CommandRecorder(env.missions)
         if self._wanted.outputs.rerun is not None:
             self._rerun = self._stack.enter_context(RerunView(env.missions, self._wanted.outputs.rerun))
+        if self._wanted.outputs.bag is not None:
+            self._wanted.outputs.bag.parent.mkdir(parents=True, exist_ok=True)
+            self._bag = self._stack.enter_context(BagWriter(env.missions, self._wanted.outputs.bag))
         self._started = True
 
     def command(self, actions: Mapping[str, Any]) -> None:
@@ -134,6 +145,8 @@ class MissionLog:
         self.commands.note()
         if self._rerun is not None:
             self._rerun.note()
+        if self._bag is not None:
+            self._bag.note()
         if not self._films:
             return
         self._painter.watch(env.missions)
@@ -182,6 +195,9 @@ class MissionLog:
         if self._rerun is not None:
             self._rerun.finish()
             written.append(self._rerun.path)
+        if self._bag is not None:
+            self._bag.finish()
+            written.append(self._bag.path)
         return written
 
     def _write_folder(self, folder: Path, figures: dict[str, Any]) -> list[Path]:

@@ -1,0 +1,219 @@
+"""Bags of missions, read by rosbags' own reader and by mcap; recorded bags as maps, worlds and decisions."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import octomap
+import pytest
+from mcap.reader import make_reader
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+
+from baselines.experiments.mission import run_mission, scripted
+from baselines.replay import main as replay
+from entropy_explore_env.belief.belief_map import FREE, SOLID, UNKNOWN, Map
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import RecordError, SettingError, WorldError
+from entropy_explore_env.explorer.explorer import Explorer
+from entropy_explore_env.explorer.planned_rate import PlannedRate
+from entropy_explore_env.interop.bag_reader import (
+    BagReader,
+    Frames,
+    MapHeard,
+    ScanHeard,
+    pose_of_matrix,
+    world_of_bag,
+)
+from entropy_explore_env.interop.bag_writer import BagWriter, typestore
+from entropy_explore_env.interop.map_files import octomap_of
+from entropy_explore_env.interop.messages import grid_of_message, pose_of, quaternion_of
+from entropy_explore_env.interop.octree import voxels_of_tree
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import find_scenario
+
+TYPES = {
+    "/map": "nav_msgs/msg/OccupancyGrid",
+    "/tf": "tf2_msgs/msg/TFMessage",
+    "/robot_0/odom": "nav_msgs/msg/Odometry",
+    "/robot_0/path": "nav_msgs/msg/Path",
+    "/robot_0/scan": "sensor_msgs/msg/PointCloud2",
+    "/robot_0/goal": "visualization_msgs/msg/Marker",
+}
+
+
+def written_mission(folder, name, time_limit_s):
+    settings = {"robots": 2, "time_limit_s": time_limit_s, "track_truth": True}
+    env = EntropyExploreEnv(with_settings(scripted(find_scenario(name)), settings))
+    with BagWriter(env.missions, folder) as bag:
+        run_mission(env, PlannedRate(), 0, lambda _: bag.note())
+        bag.finish()
+    return env
+
+
+@pytest.fixture(scope="module")
+def office(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bags") / "office"
+    return folder, written_mission(folder, "office", 30.0)
+
+
+@pytest.fixture(scope="module")
+def box(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("bags") / "box"
+    return folder, written_mission(folder, "box-7x11x5", 20.0)
+
+
+def messages(folder, topic):
+    store = typestore()
+    with Reader(folder) as reader:
+        wanted = [each for each in reader.connections if each.topic == topic]
+        for connection, stamp, raw in reader.messages(connections=wanted):
+            yield stamp * 1e-9, store.deserialize_cdr(raw, connection.msgtype)
+
+
+def test_figures_of_a_mission_are_those_of_its_bag(office):
+    folder, env = office
+    robots, time_s = env.missions.state.robots[0], float(env.missions.state.missions[0]["time_s"])
+    with Reader(folder) as reader:
+        assert TYPES.items() <= {each.topic: each.msgtype for each in reader.connections}.items()
+    for number, own in enumerate(robots):
+        scans = list(messages(folder, f"/robot_{number}/scan"))
+        assert len(scans) == own["scans"]
+        driven_m = 0.0
+        for _, path in messages(folder, f"/robot_{number}/path"):
+            places = np.array([[p.pose.position.x, p.pose.position.y] for p in path.poses])
+            driven_m += np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
+        assert driven_m == pytest.approx(own["distance_m"])
+    stamps, odometry = zip(*messages(folder, "/robot_1/odom"), strict=True)
+    assert stamps[-1] == pytest.approx(time_s) and list(stamps) == sorted(stamps)
+    pose = pose_of(odometry[-1].pose.pose.position, odometry[-1].pose.pose.orientation)
+    assert np.allclose(pose, env.view("robot_1").pose)
+    *_, (_, last) = messages(folder, "/map")
+    labels = env.joint_map().labels()[:, :, 0]
+    percent = np.select([labels == FREE, labels == SOLID], [0, 100], -1)
+    assert np.array_equal(grid_of_message(last).grid, percent)
+
+
+def test_mcap_finds_schemas_and_all_messages(office):
+    folder, _ = office
+    with (folder / "office.mcap").open("rb") as file:
+        reader = make_reader(file)
+        summary = reader.get_summary()
+        assert summary is not None
+        schemas = {schema.name: schema for schema in summary.schemas.values()}
+        assert set(TYPES.values()) <= set(schemas)
+        assert all(each.encoding == "ros2msg" and each.data for each in schemas.values())
+        counted = sum(1 for _ in reader.iter_messages(topics=["/robot_0/scan"]))
+        assert counted == len(list(messages(folder, "/robot_0/scan")))
+
+
+def test_points_of_scans_lie_on_what_is_solid(office):
+    folder, env = office
+    world, seen = env.missions.worlds[0], 0
+    for heard in BagReader(folder, topic="/robot_0/scan"):
+        assert isinstance(heard, ScanHeard) and heard.robot == 0
+        beyond = heard.points_m + 0.005 * unit(heard.points_m - heard.pose[:3])
+        at = np.floor(beyond[:, :2] / 0.1).astype(int)
+        inside = ((at >= 0) & (at < [240, 180])).all(axis=1)  # the boundary is a wall
+        seen += inside.sum()
+        assert world.occupied[at[inside, 0], at[inside, 1], 0].mean() > 0.9  # others graze corners
+    assert seen > 100
+
+
+def unit(vectors):
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def test_a_bag_is_a_world(office, box):
+    for folder, env in (office, box):
+        world, labels = world_of_bag(folder), env.joint_map().labels()
+        known = np.argwhere(labels != UNKNOWN)
+        low = np.rint((np.array(world.grid.origin_m) - env.scenario.grid.origin_m) / world.grid.voxel_size_m)
+        for at in known[:: max(len(known) // 200, 1)]:
+            assert world.occupied[tuple(at - low.astype(int))] == (labels[tuple(at)] == SOLID)
+    assert box[1].missions.grid.shape == (7, 11, 5)
+
+
+def test_goals_of_a_replayed_bag_are_those_of_an_explorer(office, capsys):
+    folder, _ = office
+    assert replay([str(folder), "--json", "--every-s", "6", "--seed", "4"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["robots"] == ["robot_0", "robot_1"] and told["goals"] == told["decisions"] > 4
+    assert 0.0 < told["decision_ms"] <= told["worst_decision_ms"]
+    explorer = Explorer(voxel_size_m=0.1, robots=2, seed=4)
+    maps = (each for each in BagReader(folder) if isinstance(each, MapHeard))
+    seen = next(each for each in maps if (each.percent >= 0).any())
+    explorer.set_map(seen.percent, seen.origin)
+    goal = explorer.goal(seen.poses, robot=0, time_s=seen.time_s)
+    assert np.allclose(goal.viewpoint, told["rows"][0]["goal"])
+
+
+def test_scans_of_a_bag_make_a_map(office, capsys):
+    assert replay([str(office[0]), "--topic", "/robot_1/scan", "--every-s", "8"]) == 0
+    assert "ms a decision" in capsys.readouterr().out
+
+
+def test_trees_are_read_without_octomap():
+    """By hand: one solid voxel at (0, 0, 0), then one free at (-1, 0, 0) beside it, both of width 1."""
+    down = [0x00, 0xC0] + [0x03, 0x00] * 14
+    east = bytes([*down, 0x02, 0x00])  # child 7 of the root, then child 0 fifteen times: x, y, z ≥ 0
+    labels, low = voxels_of_tree(east, binary=True)
+    assert labels.tolist() == [[[SOLID]]] and low.tolist() == [0, 0, 0]
+    rng = np.random.default_rng(3)
+    drawn = rng.integers(-1, 2, (6, 9, 4))
+    drawn[0, 0, 0] = drawn[-1, -1, -1] = FREE
+    drawn[2:4, 2:4, 2:4] = SOLID  # which the tree merges
+    precision = np.where(drawn == UNKNOWN, 0.001, 9.0).astype(np.float32)
+    mean = np.where(drawn == SOLID, 0.9, 0.2).astype(np.float32)
+    belief = Map(Grid(drawn.shape, 0.5, (-2.0, 1.0, 3.0)), mean, precision, 30.0)
+    for full in (False, True):
+        tree = octomap_of(belief, full)
+        labels, low = voxels_of_tree(tree[tree.index(b"\ndata\n") + 6 :], binary=not full)
+        assert np.array_equal(labels, drawn) and low.tolist() == [-4, 2, 6]
+    assert octomap.OcTree(0.5).size() == 0
+    for broken in (b"", east[:-2], b"\x00\x00", b"\xff" * 4000):
+        with pytest.raises(SettingError, match=r"octomap.data = "):
+            voxels_of_tree(broken, binary=True)
+
+
+def test_frames_are_chained():
+    frames, at = Frames(), np.array([1.0, 2.0, 0.5, 0.7, -0.2])
+    store = typestore()
+    place = store.types["geometry_msgs/msg/Vector3"](x=1.0, y=2.0, z=0.5)
+    turn = dict(zip("xyzw", quaternion_of(0.7, -0.2), strict=True))
+    frames.hear("/map", "odom", place, store.types["geometry_msgs/msg/Quaternion"](**turn))
+    still = store.types["geometry_msgs/msg/Vector3"](x=0.0, y=0.0, z=0.0)
+    frames.hear("odom", "/base_link", still, store.types["geometry_msgs/msg/Quaternion"](x=0, y=0, z=0, w=1))
+    assert np.allclose(pose_of_matrix(frames.to("map", "base_link")), at)
+    assert frames.to("map", "laser") is None
+
+
+def test_what_is_no_bag_with_maps_is_refused_by_name(office, tmp_path):
+    store = typestore()
+    text = store.types["std_msgs/msg/String"](data="hello")
+    with Writer(tmp_path / "words", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection("/map", "std_msgs/msg/String", typestore=store)
+        writer.write(connection, 1, store.serialize_cdr(text, "std_msgs/msg/String"))
+    (tmp_path / "empty").mkdir()
+    for call, kind, message in [
+        (lambda: BagReader(tmp_path / "none"), RecordError, "bag = .*none.*the folder of a bag"),
+        (lambda: BagReader(tmp_path / "empty"), RecordError, "bag = .*that can be read"),
+        (lambda: BagReader(tmp_path / "words"), RecordError, r"bag = .*it has \['/map'\]"),
+        (lambda: BagReader(tmp_path / "words", topic="/map"), SettingError, "topic = '/map': .*std_msgs"),
+        (lambda: BagReader(office[0], topic="/mapp"), SettingError, "topic = '/mapp': .*/map"),
+        (lambda: world_of_bag(office[0], "/robot_0/scan"), WorldError, "an OccupancyGrid or an Octomap"),
+        (lambda: BagWriter(office[1].missions, office[0]), SettingError, "does not exist yet"),
+        (lambda: replay([str(office[0]), "--every-s", "-1"]), SettingError, "every_s = -1"),
+    ]:
+        with pytest.raises(kind, match=message):
+            call()
+
+
+def test_a_bag_that_is_not_finished_is_not_left_behind(tmp_path):
+    env = EntropyExploreEnv("box-7x11x5")
+    env.reset(seed=0)
+    with pytest.raises(KeyboardInterrupt), BagWriter(env.missions, tmp_path / "bag") as bag:
+        bag.note()
+        raise KeyboardInterrupt
+    assert not (tmp_path / "bag").exists()
