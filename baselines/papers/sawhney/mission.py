@@ -9,7 +9,6 @@ later than the last robot arrives.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -17,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 
 from baselines.experiments.rows import Record
-from baselines.papers.sawhney.terrain_model import JACKSBORO, model_file
+from baselines.papers.sawhney.terrain_model import height_map, model_file
 from baselines.strategies.metrics import ExplorationConfig
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -36,13 +35,11 @@ class Run:
 
     Attributes:
         exploring: Of the robots.
-        world: A height map's file to be in, or JACKSBORO, in place of the scenario's world; None = that.
-        ceiling_m: Of the exposure surface above it.
+        over_model: Whether the model of real ground takes the place of the cell's world.
     """
 
     exploring: ExplorationConfig
-    world: str | None = None
-    ceiling_m: float = 4.0
+    over_model: bool = False
 
     def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
         """Run the mission.
@@ -53,7 +50,7 @@ class Run:
             `series`: time and explored share; and counts.
         """
         del strategy
-        env = self.placed(env)
+        env = _over_model(env.scenario) if self.over_model else env
         explorer = PerTimeVisibility(self.exploring)
         times_s, shares = explore_until_done(env, explorer, seed)
         figures = mission_figures(env.missions, 0)
@@ -72,13 +69,6 @@ class Run:
                 "explored": np.round(np.asarray(shares)[rows], 4).tolist(),
             },
         }
-
-    def placed(self, env: EntropyExploreEnv) -> EntropyExploreEnv:
-        """The environment, or one in this cell's height map."""
-        if self.world is None:
-            return env
-        world = model_file() if self.world == JACKSBORO else self.world
-        return _in_world(env.scenario, world, self.ceiling_m)
 
 
 def explore_until_done(
@@ -123,31 +113,6 @@ def _reached(times_s: Sequence[float], shares: Sequence[float], mark: float, lim
 
 
 @lru_cache(maxsize=1)
-def _in_world(scenario: Scenario, world: str, ceiling_m: float) -> EntropyExploreEnv:
-    """An environment in a height map, kept for the next mission."""
-    return EntropyExploreEnv(scenario, world={"path": world, "ceiling_m": ceiling_m})
-
-
-@dataclass(frozen=True)
-class MapRun:
-    """Runs a mission in the plan of a file.
-
-    Attributes:
-        exploring: Of the robots.
-        world: The file.
-    """
-
-    exploring: ExplorationConfig
-    world: str
-
-    def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
-        """Run the mission: what `Run` gives, and `clock_s`, seconds of computing."""
-        there, began = _in_plan(env.scenario, self.world), time.process_time()
-        record = Run(self.exploring)(there, strategy, seed)
-        return {**record, "clock_s": round(time.process_time() - began, 3)}
-
-
-@lru_cache(maxsize=1)
-def _in_plan(scenario: Scenario, world: str) -> EntropyExploreEnv:
-    """An environment in the plan, kept for the next mission."""
-    return EntropyExploreEnv(scenario, world={"path": world})
+def _over_model(scenario: Scenario) -> EntropyExploreEnv:
+    """Return an environment over the model of real ground, kept for the next mission."""
+    return EntropyExploreEnv(scenario, world=height_map(model_file()))

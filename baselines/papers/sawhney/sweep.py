@@ -7,16 +7,17 @@ numbers sweep 0.05 … 3.5 m²/s and 4 … 280 m³/s, from well below to well ab
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass, field, replace
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 from baselines.experiments.experiment import Amount
+from baselines.experiments.mission import Surroundings
 from baselines.experiments.trials import Cell, CellTrial, trials_of
-from baselines.papers.sawhney.mission import MapRun, Run
-from baselines.papers.sawhney.terrain_model import JACKSBORO
+from baselines.papers.sawhney.mission import Run
+from baselines.papers.sawhney.terrain_model import height_map
 from baselines.strategies.metrics import Coordinated, ExplorationConfig, Metric, Nearest
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig
@@ -133,11 +134,6 @@ def cell_id(world: str, robots: int, method: str, change: str | None = None) -> 
     return f"{world}/n{robots}/{method}" + ("" if change is None else f"-{change}")
 
 
-def map_world(file: Path) -> str:
-    """Return the name of the world of a plan's file."""
-    return f"map-{file.stem}"
-
-
 def experiment(amount: Amount) -> list[CellTrial]:
     """Return all missions: a quick run has fewer team sizes and β, and no model of real ground.
 
@@ -147,19 +143,17 @@ def experiment(amount: Amount) -> list[CellTrial]:
     plans = [file for file in amount.worlds if file.suffix not in HEIGHT_MAPS]
     if len(grounds) > 1:
         raise SettingError("worlds", " ".join(grounds), "one height map at most")
-    dem = grounds[0] if grounds else None if amount.quick else JACKSBORO
     seeds, quick, cells = amount.seeds, amount.quick, list[Cell]()
-    for world in (*PLANS, *TERRAINS, *((DEM,) if dem is not None else ())):
+    for world in (*PLANS, *TERRAINS, *((DEM,) if grounds or not quick else ())):
         part = part_of(world)
+        ground = height_map(grounds[0]) if grounds and world == DEM else None
         for robots in QUICK_TEAMS[part] if quick else TEAMS:
             for method, exploring in methods(part, quick).items():
-                cells.append(_cell(world, robots, method, exploring, seeds, dem))
-    for file in plans:
-        for method in MAP_METHODS:
-            run = MapRun(_exploring(methods("plans", False)[method]), str(file))
-            name = cell_id(map_world(file), MAP_TEAM, method)
-            scenario = _scenario(PLANS[0], MAP_TEAM, {})
-            cells.append(Cell(name, scenario, STRATEGY, min(seeds, MAP_STARTS), run))
+                cells.append(_cell(world, robots, method, exploring, seeds, file=ground))
+    for file, method in product(plans, MAP_METHODS):
+        exploring = methods("plans", False)[method]
+        cell = _cell(PLANS[0], MAP_TEAM, method, exploring, min(seeds, MAP_STARTS), file={"path": str(file)})
+        cells.append(replace(cell, id=cell_id(f"map-{file.stem}", MAP_TEAM, method)))
     for part, changes in CHANGES.items():
         worlds = (QUICK_CHANGED_IN if quick else CHANGED_IN)[part]
         for name, world, method in product(changes, worlds, CHANGED_METHODS[part]):
@@ -167,7 +161,7 @@ def experiment(amount: Amount) -> list[CellTrial]:
             exploring = {**methods(part, False)[method], **change.exploring}
             frontiers = exploring.get("frontiers", FrontierConfig())
             exploring["frontiers"] = replace(frontiers, **change.frontiers)
-            cells.append(_cell(world, CHANGED_TEAM, method, exploring, seeds, None, change.settings, name))
+            cells.append(_cell(world, CHANGED_TEAM, method, exploring, seeds, change.settings, name))
     return trials_of(cells)
 
 
@@ -177,18 +171,15 @@ def _cell(
     method: str,
     exploring: dict[str, Any],
     seeds: int,
-    dem: str | None,
     settings: dict[str, Any] | None = None,
     change: str | None = None,
+    file: dict[str, Any] | None = None,
 ) -> Cell:
-    run = Run(_exploring(exploring), dem if world == DEM else None)
-    name = cell_id(world, robots, method, change)
-    return Cell(name, _scenario(world, robots, settings or {}), STRATEGY, seeds, run)
-
-
-def _exploring(fields: dict[str, Any]) -> ExplorationConfig:
-    """How robots share frontiers: the experiment's settings, and some of a method."""
-    return ExplorationConfig(**{"once": True, **fields})
+    """Return a cell; in a world file, if there is one, else over the model if that is its world."""
+    run = Run(ExplorationConfig(**{"once": True, **exploring}), over_model=world == DEM and file is None)
+    where = None if file is None else Surroundings(worlds=json.dumps({"world": file}))
+    name, scenario = cell_id(world, robots, method, change), _scenario(world, robots, settings or {})
+    return Cell(name, scenario, STRATEGY, seeds, run, where)
 
 
 def _scenario(world: str, robots: int, settings: dict[str, Any]) -> Scenario:

@@ -10,13 +10,15 @@ import io
 import tempfile
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import cbook
 
 from entropy_explore_env.writing import write_atomically
 
-JACKSBORO = "jacksboro"
+CEILING_M = 4.0
+"""Height of the exposure surface above the ground."""
 _FOLDER = tempfile.TemporaryDirectory(prefix="entropy_explore_env-")
 ACROSS, UP = 400.0, 50.0
 """Scales of the model."""
@@ -34,6 +36,11 @@ def model_file() -> str:
         spacing_m = np.array([dem["dx"] * np.cos(middle), dem["dy"]]) * _METRES_PER_DEGREE / ACROSS
     buffer = io.BytesIO()
     np.savez_compressed(buffer, elevation=elevation_m, spacing_m=spacing_m)
-    path = Path(_FOLDER.name) / f"{JACKSBORO}.npz"
+    path = Path(_FOLDER.name) / "jacksboro.npz"
     write_atomically(path, buffer.getvalue())
     return str(path)
+
+
+def height_map(file: str) -> dict[str, Any]:
+    """Return the world of a height map, as environments take it."""
+    return {"path": file, "ceiling_m": CEILING_M}

@@ -27,7 +27,7 @@ from baselines.papers.sawhney.sweep import (
     methods,
     part_of,
 )
-from baselines.papers.sawhney.terrain_model import JACKSBORO, model_file
+from baselines.papers.sawhney.terrain_model import model_file
 from baselines.strategies.metrics import ExplorationConfig, Metric, Nearest
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.changes import with_settings
@@ -172,9 +172,10 @@ def test_a_height_map_takes_the_place_of_the_model(tmp_path):
     files = [tmp_path / name for name in ("a.tif", "b.tif")]
     for file in files:
         file.write_bytes(b"heights")
-    flown = {trial.point.record.world for trial in sweep.experiment(Amount(True, 2, (files[0],)))}
-    assert flown == {None, str(files[0])}
-    assert {trial.point.record.world for trial in sweep.experiment(Amount(False, 2))} == {None, JACKSBORO}
+    assert {trial.world for trial in sweep.experiment(Amount(True, 2, (files[0],)))} >= {"a.tif", "office"}
+    flown = {trial.point.record.over_model for trial in sweep.experiment(Amount(True, 2, (files[0],)))}
+    assert flown == {False}
+    assert {trial.point.record.over_model for trial in sweep.experiment(Amount(False, 2))} == {False, True}
     with pytest.raises(SettingError, match="one height map at most"):
         sweep.experiment(Amount(True, 2, tuple(files)))
 
