@@ -46,7 +46,7 @@ def figure_beta(records: Records, part: str) -> Figure:
     for axes, title in ((left, "all worlds and team sizes"), (right, "to 95 %, by world")):
         axes.axhline(1.0, color="0.3", linewidth=0.9, linestyle="--")
         axes.set(xscale="log", xlabel="β in the paper's numbers (units: see the text)")
-        axes.set_xticks(betas, [str(beta) for beta in betas])
+        axes.set_xticks(betas, [str(beta) for beta in betas], rotation=60, fontsize=8)
         axes.minorticks_off()
         axes.set_title(title, fontsize=9)
         axes.legend(frameon=False, fontsize=8)
