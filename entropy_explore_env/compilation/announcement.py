@@ -10,6 +10,8 @@ from __future__ import annotations
 import logging
 import multiprocessing
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 _LOGGER = logging.getLogger("entropy_explore_env")
@@ -20,7 +22,6 @@ class _Progress:
 
     def __init__(self) -> None:
         self.compiled: list[str] = []
-        self.began_s: float | None = None
         self.spent_s = 0.0
         self.pending = False
         self.announced = False
@@ -35,21 +36,19 @@ def compiled_kernels() -> tuple[str, ...]:
     return tuple(_progress.compiled)
 
 
-def begin_compiling(name: str, folder: Path | None) -> None:
-    """A kernel that Python calls is not on disk."""
+@contextmanager
+def compiling(name: str, folder: Path | None) -> Iterator[None]:
+    """Note a kernel that Python calls while it is compiled; the first one is announced."""
     _progress.compiled.append(name)
-    _progress.began_s = time.perf_counter()
     if not _progress.announced:
         _progress.announced = _progress.pending = True
         kept = "" if folder is None else f"; they are kept in {short_path(folder)}"
         _say(f"entropy_explore_env: compiling kernels, a minute or two{kept}")
-
-
-def end_compiling() -> None:
-    """It is compiled."""
-    if _progress.began_s is not None:
-        _progress.spent_s += time.perf_counter() - _progress.began_s
-        _progress.began_s = None
+    began_s = time.perf_counter()
+    try:
+        yield
+    finally:
+        _progress.spent_s += time.perf_counter() - began_s
 
 
 def end_of_step() -> None:

@@ -11,17 +11,12 @@ import pickle
 import pkgutil
 import re
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import llvmlite
 import numba
 import numpy as np
-from numba.core import config, sigutils
-from numba.core.caching import _Cache
-from numba.core.dispatcher import Dispatcher
-from numba.core.serialize import dumps
 
 from entropy_explore_env.compilation import announcement
 from entropy_explore_env.compilation.folder import (
@@ -31,109 +26,78 @@ from entropy_explore_env.compilation.folder import (
     partial_name,
     remove_old_kernels,
 )
+from entropy_explore_env.compilation.numba_parts import CODE_SETTINGS, Dispatcher, config, dumps, sigutils
 from entropy_explore_env.compilation.stamps import NoStampError, describe_type, stamp
 
-
-def _sources_digest() -> str:
-    """A digest of the files that say how kernels are compiled, as they are when they are imported."""
-    names = ("dispatchers.py", "kernels.py", "cache.py")
-    sources = [pkgutil.get_data(__package__ or "", name) or b"" for name in names]
-    return hashlib.sha256(b"".join(sources)).hexdigest()
-
-
-_COMPILED_BY = _sources_digest()
+_SOURCES = ("dispatchers.py", "kernels.py", "cache.py", "numba_parts.py")
+_COMPILED_BY = hashlib.sha256(
+    b"".join(pkgutil.get_data(__package__ or "", name) or b"" for name in _SOURCES)
+).hexdigest()
+"""A digest of the files that say how kernels are compiled, as they are when they are imported."""
 _DIGEST_BYTES = 32
-_SETTINGS = ("OPT", "BOUNDSCHECK", "LOOP_VECTORIZE", "SLP_VECTORIZE", "DEBUGINFO_DEFAULT", "ENABLE_PROFILING")
-"""Of Numba's, by environment variables, those which change the code that it makes."""
 
 
-class KernelCache(_Cache):
-    """What a dispatcher of Numba's asks for compiled code.
+class KernelCache:
+    """The compiled code of one kernel, on disk.
 
     Args:
         kernel: Whose code it is.
         form: "outer" or "inner".
-        rebuild: Makes a result of compiling from a target context and what its `_reduce` gave.
         kept: Whether code is kept on disk.
     """
 
-    def __init__(
-        self, kernel: Dispatcher, form: str, rebuild: Callable[[Any, Any], Any], *, kept: bool
-    ) -> None:
-        self._kernel = kernel
-        self._form = form
-        self._rebuild = rebuild
-        self._kept = kept
+    def __init__(self, kernel: Dispatcher, form: str, *, kept: bool) -> None:
+        """Read and write nothing yet."""
+        self.kernel, self._form, self._kept = kernel, form, kept
 
-    @property
-    def cache_path(self) -> str:
-        """The folder."""
-        return str(kernel_folder())
-
-    def enable(self) -> None:
-        """Keep code on disk."""
-        self._kept = True
-
-    def disable(self) -> None:
-        """Keep no code on disk."""
-        self._kept = False
-
-    def flush(self) -> None:
-        """Nothing: no file is ever out of date."""
-
-    def name_of(self, sig: Any, target_context: Any) -> str | None:  # noqa: ANN401
-        """A digest of what the code for these types depends on; None = that is not known."""
+    def name_of(self, sig: Any, target: Any) -> str | None:  # noqa: ANN401 - a signature, a target context
+        """Return a digest of what the code for these types depends on; None = that is not known."""
         try:
             args, returned = _normal(sig)
-            described = [stamp(self._kernel), *map(describe_type, args), str(returned)]
+            described = [stamp(self.kernel), *map(describe_type, args), str(returned)]
         except NoStampError as error:
             announcement.explain_no_stamp(str(error))
             return None
-        described += [self._form, repr(target_context.codegen().magic_tuple()), *_environment()]
+        described += [self._form, repr(target.codegen().magic_tuple()), *_environment()]
         return hashlib.sha256("\n".join(described).encode()).hexdigest()[:40]
 
-    def load_overload(self, sig: Any, target_context: Any) -> Any:  # noqa: ANN401
-        """A result of compiling, or None if there is none on disk."""
-        target_context.refresh()
-        path = self._path(sig, target_context)
-        data = None if path is None else _read(path)
-        if path is not None and data is not None:
-            kept_sig, reduced = pickle.loads(data)
-            if kept_sig == _normal(sig):
-                mark_used(path)
-                return self._rebuild(target_context, reduced)
-        if self._form == "outer":
-            announcement.begin_compiling(self._name(), kernel_folder())
-        return None
-
-    def save_overload(self, sig: Any, data: Any) -> None:  # noqa: ANN401
-        """Write a result of compiling, unless it holds addresses of this process."""
-        if self._form == "outer":
-            announcement.end_compiling()
-        path = self._path(sig, data.target_context)
-        if path is None or data.library.has_dynamic_globals or data.lifted:
-            return
-        target = data.target_context
-        target.refresh()
-        try:
-            _write(path, dumps((_normal(sig), data._reduce())))
-        except OSError as error:
-            announcement.explain_not_kept(path.parent, error)
-
-    def _path(self, sig: Any, target_context: Any) -> Path | None:  # noqa: ANN401
-        if not self._kept:
-            return None
-        name = self.name_of(sig, target_context)
+    def path_of(self, name: str | None) -> Path | None:
+        """Return the file of the code with this digest; None = it is not kept."""
         folder = kernel_folder()
-        if folder is None:
+        if self._kept and folder is None:
             announcement.explain_not_kept(None, None)
-        if name is None or folder is None:
+        if not self._kept or name is None or folder is None:
             return None
-        return folder / f"{self._name()}-{name}{SUFFIX}"
+        return folder / f"{self.module_name}-{name}{SUFFIX}"
 
-    def _name(self) -> str:
-        function = self._kernel.py_func
+    @property
+    def module_name(self) -> str:
+        """The kernel's name, with that of its module."""
+        function = self.kernel.py_func
         return re.sub(r"[^\w.]", "", f"{function.__module__}.{function.__qualname__}")[-80:]
+
+
+def load(path: Path | None, sig: Any) -> Any:  # noqa: ANN401 - a signature; what a result of compiling reduces to
+    """Return what was written into a file for a signature; None = nothing, or something else."""
+    data = None if path is None else _read(path)
+    if path is None or data is None:
+        return None
+    kept_sig, reduced = pickle.loads(data)
+    if kept_sig != _normal(sig):
+        return None
+    mark_used(path)
+    return reduced
+
+
+def save(path: Path | None, sig: Any, result: Any) -> None:  # noqa: ANN401 - a signature, a result of compiling
+    """Write a result of compiling, unless it holds addresses of this process."""
+    if path is None or result.library.has_dynamic_globals or result.lifted:
+        return
+    result.target_context.refresh()
+    try:
+        _write(path, dumps((_normal(sig), result._reduce())))
+    except OSError as error:
+        announcement.explain_not_kept(path.parent, error)
 
 
 def _environment() -> list[str]:
@@ -145,7 +109,7 @@ def _environment() -> list[str]:
         np.__version__,
         sys.implementation.cache_tag,
     )
-    return [repr(versions), repr([getattr(config, name, None) for name in _SETTINGS])]
+    return [repr(versions), repr([getattr(config, name, None) for name in CODE_SETTINGS])]
 
 
 def _normal(sig: Any) -> Any:  # noqa: ANN401

@@ -4,75 +4,98 @@ Numba makes machine code and two wrappers of each function, also of those which 
 call. For a tree of a hundred kernels that is more than half of the time to compile it. So a kernel has two
 forms. `Kernel` is what Python calls. Where another kernel calls it, Numba is given its `InnerKernel`, which
 stops at LLVM's intermediate code. The outermost kernel is optimised and translated as a whole.
-
-This builds on parts of Numba which it does not document. tests/compilation/test_dispatchers.py fails when one
-of them disappears, and pyproject.toml bounds Numba's versions to those that were tested.
 """
 
 from __future__ import annotations
 
 import gc
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import Any
 
 import llvmlite.binding as llvm
-from numba.core import compiler, errors, sigutils, types
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.compiler_machinery import PassManager, register_pass
-from numba.core.registry import CPUDispatcher
-from numba.core.typed_passes import NativeLowering
 
-from entropy_explore_env.compilation.cache import KernelCache
-from entropy_explore_env.compilation.stamps import forget_parts
+from entropy_explore_env.compilation import announcement, cache, helper
+from entropy_explore_env.compilation.claims import Claim, claim
+from entropy_explore_env.compilation.folder import kernel_folder
+from entropy_explore_env.compilation.numba_parts import (
+    UNUSED_PASSES,
+    AnalysisPass,
+    CPUDispatcher,
+    JITCodeLibrary,
+    NativeLowering,
+    NopythonTypeInference,
+    PassManager,
+    compiler,
+    errors,
+    global_compiler_lock,
+    register_pass,
+    sigutils,
+    type_inference_stage,
+    types,
+)
+from entropy_explore_env.compilation.stamps import forget_parts, tree_size
 
 _WRAPPERS = {"no_cfunc_wrapper": True}
+_WORTH_DIVIDING = 10
+"""So many kernels are compiled by two processes; to look for what each of them does takes time as well."""
 _NO_WRAPPERS = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
 
 
-class _Compiling(NamedTuple):
-    """A kernel that is being compiled, and what its symbols are to be called."""
+class _Compiling:
+    """A kernel that is being compiled for some types."""
 
-    function: Callable[..., Any]
-    name: str | None
+    def __init__(self, form: _Form, sig: Any) -> None:  # noqa: ANN401 - types or a signature
+        self.form, self.sig = form, sig
+        self.name = form.disk.name_of(sig, form.targetctx)
+        """The digest in the name of its file, which its symbols bear too: Numba numbers functions as they
+        come, so that code from another process may bear the number of another function of this one."""
+        self.path = form.disk.path_of(self.name)
+        self.claim: Claim | None = None
 
 
-class _Stack(threading.local):
-    """What this thread is compiling, the innermost last."""
+class _State(threading.local):
+    """What this thread is compiling, the innermost last, and the calls that a survey found."""
 
     def __init__(self) -> None:
         self.kernels: list[_Compiling] = []
+        self.found: dict[tuple[InnerKernel, tuple[types.Type, ...]], None] | None = None
 
 
-_stack = _Stack()
+_state = _State()
+
+
+class _CompiledElsewhereError(Exception):
+    """Another process has just compiled the kernel; holds what it wrote."""
 
 
 @contextmanager
-def _compiling(function: Callable[..., Any], cache: KernelCache, sig: Any, target: Any) -> Iterator[None]:  # noqa: ANN401
-    """While a kernel is compiled, its symbols bear the name of the file in the cache.
-
-    Numba numbers functions as they come, so that code from another process may bear the number of another
-    function of this one. The name of the file is never that of other code.
+def _compiling(form: _Form, sig: Any) -> Iterator[_Compiling]:  # noqa: ANN401 - types or a signature
+    """Note what is being compiled, and keep the collector of garbage away meanwhile.
 
     Raises:
         numba.core.errors.TypingError: The kernel calls itself.
     """
-    outermost = not _stack.kernels
+    outermost = not _state.kernels
     if outermost:
         forget_parts()
-    if any(compiling.function is function for compiling in _stack.kernels):
-        raise errors.TypingError(f"kernel {function.__qualname__} calls itself; Numba's own njit allows that")
-    _stack.kernels.append(_Compiling(function, cache.name_of(sig, target)))
+    if any(compiling.form.py_func is form.py_func for compiling in _state.kernels):
+        raise errors.TypingError(
+            f"kernel {form.py_func.__qualname__} calls itself; Numba's own njit allows that"
+        )
+    compiling = _Compiling(form, sig)
+    _state.kernels.append(compiling)
     collecting = outermost and gc.isenabled()
     # A compiler makes many objects and few cycles: looking for them takes an eighth of its time.
     if collecting:
         gc.disable()
     try:
-        yield
+        yield compiling
     finally:
-        _stack.kernels.pop()
+        _state.kernels.pop()
+        if compiling.claim is not None:
+            compiling.claim.release()
         if collecting:
             if not gc.get_freeze_count():  # what is left joins the oldest objects unexamined
                 gc.freeze()
@@ -80,31 +103,120 @@ def _compiling(function: Callable[..., Any], cache: KernelCache, sig: Any, targe
             gc.enable()
 
 
+class KernelFlags(compiler.Flags):
+    """Numba's options of a function, which it compares with every call that it resolves: by identity here."""
+
+    __slots__ = ("_copy", "_hash")
+
+    def __hash__(self) -> int:
+        """Return the hash of the options as they were first asked for it."""
+        if not hasattr(self, "_hash"):
+            self._hash = super().__hash__()
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether all options are the same."""
+        return self is other or super().__eq__(other)
+
+    def copy(self) -> KernelFlags:
+        """Return a copy, the same one each time."""
+        if not hasattr(self, "_copy"):
+            self._copy = super().copy()
+        return self._copy
+
+
+_known_flags: dict[KernelFlags, KernelFlags] = {}
+
+
+def _shared_flags(flags: compiler.Flags) -> KernelFlags:
+    """The one object for these options."""
+    own = KernelFlags(flags)
+    return _known_flags.setdefault(own, own)
+
+
 class KernelCompiler(compiler.Compiler):
-    """Numba's compiler; the symbols get the name of the file in the cache."""
+    """Numba's compiler; other kernels that it calls come first, and symbols get the name of the file."""
 
     def define_pipelines(self) -> list[PassManager]:
-        """Numba's pipeline."""
-        name = _stack.kernels[-1].name
+        """Return Numba's passes and one more."""
+        name = _state.kernels[-1].name
         if name is not None:
             self.state.func_id.unique_id = name
-        return super().define_pipelines()
-
-
-class InnerKernelCompiler(KernelCompiler):
-    """The same, up to the intermediate code."""
-
-    def define_pipelines(self) -> list[PassManager]:
-        """Numba's pipeline, with another end."""
         pipelines = super().define_pipelines()
         for pipeline in pipelines:
-            steps = [
-                (InnerLowering if step is NativeLowering else step, text) for step, text in pipeline.passes
-            ]
-            pipeline.passes = steps
+            pipeline.passes = list(self.passes_from(pipeline.passes))
             pipeline._finalized = False
             pipeline.finalize()
         return pipelines
+
+    def passes_from(self, passes: list[tuple[Any, str]]) -> Iterator[tuple[Any, str]]:
+        """Yield the passes, each with a text."""
+        for step, text in passes:
+            if step is NopythonTypeInference:
+                yield CalleesFirst, "compile what it calls"
+            yield step, text
+
+
+class InnerKernelCompiler(KernelCompiler):
+    """The same, up to the intermediate code, without passes that lean kernels have no use for."""
+
+    def passes_from(self, passes: list[tuple[Any, str]]) -> Iterator[tuple[Any, str]]:
+        """Yield the passes, each with a text."""
+        lean = not self.state.flags.nrt
+        for step, text in super().passes_from(passes):
+            if step is NativeLowering:
+                yield InnerLowering, text
+            elif not (lean and step.__name__ in UNUSED_PASSES):
+                yield step, text
+
+
+@register_pass(mutates_CFG=False, analysis_only=True)
+class CalleesFirst(AnalysisPass):
+    """Compiles the kernels that one calls, and then claims it, so that processes share the work."""
+
+    _name = "callees_first"
+
+    def __init__(self) -> None:
+        """Numba makes one object of each pass."""
+        super().__init__()
+
+    def run_pass(self, state: Any) -> bool:  # noqa: ANN401 - Numba's bag of everything
+        """Go through the calls whose types are known, again while there are new ones."""
+        compiling, tried = _state.kernels[-1], set()
+        divided = helper.shared() and tree_size(compiling.form.disk.kernel) >= _WORTH_DIVIDING
+        while divided and (calls := [call for call in _survey(state) if call not in tried]):
+            tried.update(calls)
+            for kernel, args in reversed(calls) if helper.serves() else calls:
+                try:
+                    kernel.compile(args)
+                except errors.NumbaError:  # the types may not be the last word; if they are, it is met again
+                    continue
+        if compiling.path is not None:
+            compiling.claim = claim(compiling.path)
+            written = cache.load(compiling.path, compiling.sig)
+            if written is not None:
+                raise _CompiledElsewhereError(written)
+        return False
+
+
+def _survey(state: Any) -> list[tuple[InnerKernel, tuple[types.Type, ...]]]:  # noqa: ANN401 - as above
+    """Calls of other kernels, neither compiled nor on disk, whose types follow from what is known."""
+    _state.found = {}
+    try:
+        type_inference_stage(
+            state.typingctx,
+            state.targetctx,
+            state.func_ir,
+            state.args,
+            state.return_type,
+            state.locals,
+            raise_errors=False,
+        )
+    except errors.NumbaError:
+        pass
+    finally:
+        found, _state.found = _state.found, None
+    return list(found)
 
 
 class InnerLibrary(JITCodeLibrary):
@@ -129,12 +241,12 @@ class InnerLibrary(JITCodeLibrary):
         self._finalized = True
 
     def serialize_using_object_code(self) -> tuple[str, str, bytes]:
-        """What is kept of it."""
+        """Return what is kept of it."""
         return self.serialize_using_bitcode()
 
     @classmethod
     def from_bitcode(cls, codegen: Any, state: tuple[str, str, bytes]) -> InnerLibrary:  # noqa: ANN401
-        """What `serialize_using_object_code` gave, ready to be linked."""
+        """Return what `serialize_using_object_code` was made of, ready to be linked."""
         name, _, bitcode = state
         library = cls(codegen, name)
         library._final_module = llvm.parse_bitcode(bitcode)
@@ -160,7 +272,7 @@ class InnerLowering(NativeLowering):
         return True
 
 
-def _rebuild_inner(target_context: Any, reduced: tuple[Any, ...]) -> compiler.CompileResult:  # noqa: ANN401
+def _rebuilt_inner(target_context: Any, reduced: tuple[Any, ...]) -> compiler.CompileResult:  # noqa: ANN401
     """The inverse of `CompileResult._reduce` for an inner kernel."""
     library, fndesc, environment, signature, objectmode, lifted, annotation, reload_init, environments = (
         reduced
@@ -186,25 +298,11 @@ def _rebuild_inner(target_context: Any, reduced: tuple[Any, ...]) -> compiler.Co
     )
 
 
-def _rebuild_outer(target_context: Any, reduced: tuple[Any, ...]) -> compiler.CompileResult:  # noqa: ANN401
-    return compiler.CompileResult._rebuild(target_context, *reduced)
-
-
-class InnerKernel(CPUDispatcher):
-    """A kernel as other kernels call it."""
+class _Form(CPUDispatcher):
+    """A kernel in one of its two forms; compiled once for each combination of types, by one process."""
 
     _compiler: Any
-
-    def __init__(self, kernel: Kernel) -> None:
-        options = {**kernel.targetoptions, **_NO_WRAPPERS}
-        super().__init__(kernel.py_func, {}, options, InnerKernelCompiler)
-        kept = not options.get("forceinline", False)
-        self._cache: KernelCache = KernelCache(kernel, "inner", _rebuild_inner, kept=kept)
-
-    @property
-    def is_compiling(self) -> bool:
-        """Never said: Numba would begin to resolve a recursion, which intermediate code cannot hold."""
-        return False
+    disk: cache.KernelCache
 
     def compile(self, sig: Any) -> object:  # noqa: ANN401 - types of arguments, or a signature
         """As Numba's, without timers: those of a whole tree of calls would be told of every call of LLVM."""
@@ -213,24 +311,76 @@ class InnerKernel(CPUDispatcher):
             known = self.overloads.get(tuple(args))
             if known is not None:
                 return known.entry_point
-            with _compiling(self.py_func, self._cache, sig, self.targetctx):
-                result = self._cache.load_overload(sig, self.targetctx)
-                if result is None:
-                    result = self._compile(args, return_type)
-                    self._cache.save_overload(sig, result)
-            self.targetctx.insert_user_function(result.entry_point, result.fndesc, [result.library])
-            self.overloads[tuple(result.signature.args)] = result
+            with _compiling(self, sig) as compiling:
+                self.targetctx.refresh()
+                written = cache.load(compiling.path, sig)
+                if written is None:
+                    result = self._result(compiling, args, return_type)
+                else:
+                    result = self._rebuilt(written)
+            self._keep(result)
             return result.entry_point
 
-    def _compile(self, args: Any, return_type: Any) -> compiler.CompileResult:  # noqa: ANN401
+    def _result(self, compiling: _Compiling, args: Any, return_type: Any) -> compiler.CompileResult:  # noqa: ANN401
         try:
-            return self._compiler.compile(args, return_type)
+            result = self._compiler.compile(args, return_type)
+        except _CompiledElsewhereError as found:
+            return self._rebuilt(found.args[0])
         except errors.ForceLiteralArg as request:
             fold = self._compiler.fold_argument_types
             raise request.bind_fold_arguments(lambda args, kws: fold(args, kws)[1]) from None
+        cache.save(compiling.path, compiling.sig, result)
+        return result
+
+    def is_ready(self, args: tuple[types.Type, ...]) -> bool:
+        """Whether it is compiled for these types, here or on disk: then it is taken from there."""
+        if args in self.overloads:
+            return True
+        reduced = cache.load(self.disk.path_of(self.disk.name_of(args, self.targetctx)), args)
+        if reduced is not None:
+            self._keep(self._rebuilt(reduced))
+        return reduced is not None
+
+    def _rebuilt(self, reduced: tuple[Any, ...]) -> compiler.CompileResult:
+        raise NotImplementedError
+
+    def _keep(self, result: compiler.CompileResult) -> None:
+        raise NotImplementedError
 
 
-class Kernel(CPUDispatcher):
+class InnerKernel(_Form):
+    """A kernel as other kernels call it."""
+
+    def __init__(self, kernel: Kernel) -> None:
+        """Make the inner form of a kernel."""
+        options = {**kernel.targetoptions, **_NO_WRAPPERS}
+        super().__init__(kernel.py_func, {}, options, InnerKernelCompiler)
+        self._compiler._customize_flags = _shared_flags
+        self.disk = cache.KernelCache(kernel, "inner", kept=not options.get("forceinline", False))
+
+    @property
+    def is_compiling(self) -> bool:
+        """Never said: Numba would begin to resolve a recursion, which intermediate code cannot hold."""
+        return False
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:  # noqa: ANN401 - types of arguments
+        """As Numba's; a survey only notes what would have to be compiled."""
+        if _state.found is not None:
+            folded = tuple(self._compiler.fold_argument_types(args, kws)[1])
+            if not self.is_ready(folded):
+                _state.found[self, folded] = None
+                raise errors.TypingError("not compiled yet")
+        return super().get_call_template(args, kws)
+
+    def _rebuilt(self, reduced: tuple[Any, ...]) -> compiler.CompileResult:
+        return _rebuilt_inner(self.targetctx, reduced)
+
+    def _keep(self, result: compiler.CompileResult) -> None:
+        self.targetctx.insert_user_function(result.entry_point, result.fndesc, [result.library])
+        self.overloads[tuple(result.signature.args)] = result
+
+
+class Kernel(_Form):
     """A kernel as Python calls it; as a dispatcher that `njit` makes.
 
     It cannot call itself, nor be a callback: it has no wrapper for C.
@@ -243,8 +393,9 @@ class Kernel(CPUDispatcher):
         targetoptions: dict[str, Any] | None = None,
         pipeline_class: type[compiler.CompilerBase] = KernelCompiler,
     ) -> None:
+        """Make both forms; nothing is compiled yet."""
         super().__init__(py_func, locals or {}, {**(targetoptions or {}), **_WRAPPERS}, pipeline_class)
-        self._cache: KernelCache = KernelCache(self, "outer", _rebuild_outer, kept=True)
+        self.disk = cache.KernelCache(self, "outer", kept=True)
         self.inner = InnerKernel(self)
         self.typingctx._remove_global(self)  # Numba takes a dispatcher for one that calls itself
         self.typingctx.insert_global(self, self._numba_type_)
@@ -254,13 +405,19 @@ class Kernel(CPUDispatcher):
         """What other kernels take it for: the inner form."""
         return self.inner._numba_type_
 
-    def compile(self, sig: Any) -> object:  # noqa: ANN401
-        """See Numba's `Dispatcher.compile`."""
-        with global_compiler_lock, _compiling(self.py_func, self._cache, sig, self.targetctx):
-            return super().compile(sig)
+    def _result(self, compiling: _Compiling, args: Any, return_type: Any) -> compiler.CompileResult:  # noqa: ANN401
+        """As of every form; says so, and lets the helper take part."""
+        helper.send([(self, tuple(args))])
+        with announcement.compiling(self.disk.module_name, kernel_folder()):
+            return super()._result(compiling, args, return_type)
 
-    def add_overload(self, cres: compiler.CompileResult) -> None:
-        """As Numba's; tells the machine code where the environments of inner kernels are."""
-        for environment in cres._find_referenced_environments():
-            cres.codegen.set_env(environment.env_name, environment)
-        super().add_overload(cres)
+    def _rebuilt(self, reduced: tuple[Any, ...]) -> compiler.CompileResult:
+        result = compiler.CompileResult._rebuild(self.targetctx, *reduced)
+        self.targetctx.insert_user_function(result.entry_point, result.fndesc, [result.library])
+        return result
+
+    def _keep(self, result: compiler.CompileResult) -> None:
+        """Make it what Python calls; tell the machine code where the environments of inner kernels are."""
+        for environment in result._find_referenced_environments():
+            result.codegen.set_env(environment.env_name, environment)
+        self.add_overload(result)

@@ -8,10 +8,12 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
-from numba.core import config
+from entropy_explore_env.compilation.numba_parts import config
 
 FOLDER = "entropy_explore_env"
 SUFFIX = ".kernel"
+CLAIM = ".claim"
+"""Of the files that processes lock while they compile a kernel."""
 MAX_DAYS = 90.0
 """Kernels that no process has used for as long are removed."""
 MAX_BYTES = 1 << 30
@@ -86,7 +88,7 @@ def remove_old_kernels(folder: Path, max_bytes: int = MAX_BYTES) -> None:
         except OSError:
             continue
         age_s = now - status.st_mtime
-        if age_s > (_DAY_S if entry.suffix == _PARTIAL else MAX_DAYS * _DAY_S):
+        if age_s > (MAX_DAYS * _DAY_S if entry.suffix == SUFFIX else _DAY_S):
             _remove(entry)
         elif entry.suffix == SUFFIX:
             kept.append((status.st_mtime, status.st_size, entry))
@@ -102,7 +104,7 @@ def remove_old_kernels(folder: Path, max_bytes: int = MAX_BYTES) -> None:
 
 def _entries(folder: Path) -> list[Path]:
     try:
-        return [entry for entry in folder.iterdir() if entry.suffix in (SUFFIX, _PARTIAL)]
+        return [entry for entry in folder.iterdir() if entry.suffix in (SUFFIX, CLAIM, _PARTIAL)]
     except OSError:
         return []
 

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
 from numba import typeof
-from numba.core import config
 
+from entropy_explore_env.compilation import helper
 from entropy_explore_env.compilation.dispatchers import Kernel
+from entropy_explore_env.compilation.numba_parts import config
+from entropy_explore_env.compilation.stamps import forget_parts
 
 ASSERTING = os.environ.get("ENTROPY_EXPLORE_ASSERT", "0") != "0"
 """Whether kernels assert what holds unless they are wrong, such as that every event of a mission is used up.
@@ -82,3 +84,19 @@ def entry_point(compiled: Any, *arguments: Any) -> Callable[..., Any]:  # noqa: 
     known = compiled.overloads.get(types)
     found: Any = compiled.compile(types) if known is None else known.entry_point
     return found
+
+
+def compile_ahead(calls: Iterable[tuple[Any, tuple[Any, ...]]]) -> None:
+    """Let a second process compile kernels that this one is about to call, unless they are on disk.
+
+    Args:
+        calls: Kernels, each with arguments of the types that it will be called with.
+    """
+    forget_parts()
+    missing = []
+    for compiled, arguments in calls:
+        types = tuple(typeof(argument) for argument in arguments)
+        if isinstance(compiled, Kernel) and not compiled.is_ready(types):
+            missing.append((compiled, types))
+    if missing:
+        helper.send(missing, start=True)

@@ -22,8 +22,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numba.core import types as numba_types
-from numba.core.dispatcher import Dispatcher
+
+from entropy_explore_env.compilation.numba_parts import Dispatcher
+from entropy_explore_env.compilation.numba_parts import types as numba_types
 
 _TRUSTED = frozenset(sys.stdlib_module_names) | {"numpy", "numba", "llvmlite"}
 """Packages of which the stamp names no more than the version: what comes from them has a name."""
@@ -64,6 +65,18 @@ def stamp(kernel: Dispatcher) -> str:
         NoStampError: It reaches something that cannot be described, or the globals of a kernel that it
             reaches have changed since that one may have been compiled.
     """
+    return _stamp_and_size(kernel)[0]
+
+
+def tree_size(kernel: Dispatcher) -> int:
+    """Return how many kernels one is made of: itself and all below it; 0 where it has no stamp."""
+    try:
+        return _stamp_and_size(kernel)[1]
+    except NoStampError:
+        return 0
+
+
+def _stamp_and_size(kernel: Dispatcher) -> tuple[str, int]:
     numbers = {id(kernel): 0}
     reached = [kernel]
     hasher = hashlib.sha256()
@@ -77,7 +90,7 @@ def stamp(kernel: Dispatcher) -> str:
                 numbers[id(callee)] = len(reached)
                 reached.append(callee)
             hasher.update(numbers[id(callee)].to_bytes(4, "little"))
-    return hasher.hexdigest()
+    return hasher.hexdigest(), len(reached)
 
 
 def _part(kernel: Dispatcher) -> _Part:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.raycast import Crossing
-from entropy_explore_env.compilation.kernels import entry_point
+from entropy_explore_env.compilation.kernels import compile_ahead, entry_point
 from entropy_explore_env.missions.navigation import Planning, plan_missions
 from entropy_explore_env.missions.observation.layout import ObservationLayout, candidate_offsets, part_offsets
 from entropy_explore_env.missions.observation.mask import mask_missions
@@ -166,8 +166,22 @@ class CompiledStep:
             planning = Planning(params, actions, *shown, self._choices, *maps, no_fly, estimates)
             observed = Observed(*shown, state.heard, *maps, state.pooled, estimates)
             proposing = Proposing(params, state, no_fly, estimates)
+            first = self._calls is None
             self._calls = calls = _Calls(arrays, planning, observed, proposing, None, None)
+            if first:
+                self._compile_ahead(calls)
         return calls
+
+    def _compile_ahead(self, calls: _Calls) -> None:
+        """Have the step compiled while missions start and strategies get ready."""
+        choices, work, reach = self._choices, self.work[0], (0, self._count)
+        actions = np.zeros((*choices.shape, 5)), np.zeros(choices.shape, np.int64)
+        step = (self._rules, calls.arrays.state, choices, work, *actions, *reach)
+        plans = [
+            (plan_missions, (calls.planning, navigator, kind, work.braking, *actions, *reach))
+            for kind, navigator in self.navigators[0].items()
+        ]
+        compile_ahead([(step_missions, step), *plans])
 
     def estimates_of(self, state: MissionState) -> np.ndarray | None:
         """(E, A) ESTIMATE, what robots believe of their poses; None = all know where they are."""

@@ -19,8 +19,8 @@ def fresh(monkeypatch):
 
 def compile_two(folder: Path | None = None) -> None:
     for name in ("begin", "step"):
-        announcement.begin_compiling(name, folder)
-        announcement.end_compiling()
+        with announcement.compiling(name, folder):
+            pass
 
 
 def test_one_line_before_and_one_after(caplog):
