@@ -297,10 +297,29 @@ class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):
         """What a robot observes.
 
         Raises:
+            CallOrderError: There was no reset yet.
             SettingError: No robot has this name.
         """
+        self._begun("observe")
         self._team.observation_space(agent)
         return super().observe(agent)
+
+    def last(self, observe: bool = True) -> Any:  # noqa: ANN401 - PettingZoo's signature
+        """What the robot whose turn it is observes, and what it earned since it last acted.
+
+        Raises:
+            CallOrderError: There was no reset yet.
+        """
+        self._begun("last")
+        return super().last(observe)
+
+    def state(self) -> np.ndarray:
+        """What all robots observe; see `EntropyExploreEnv.state`."""
+        return self._team.state()
+
+    def _begun(self, call: str) -> None:
+        if self._team.missions.episodes[0] < 0:
+            raise CallOrderError(f"{call} before reset: call reset() first")
 
     def step(self, action: Any) -> None:  # noqa: ANN401 - PettingZoo's signature
         """Take the action of the robot whose turn it is; see `EntropyExploreEnv.step`.

@@ -103,8 +103,10 @@ class RobotVecEnv(VecEnv):
             **settings,
         )
         if seeds is not None:
-            counted = isinstance(seeds, Sequence | np.ndarray) and np.shape(seeds) == (missions,)
-            if not counted or not all(is_whole(seed, 0) for seed in seeds):
+            listed = isinstance(seeds, list | tuple | range) or (
+                np.ndim(seeds) == 1 and isinstance(seeds, np.ndarray)
+            )
+            if not listed or len(seeds) != missions or not all(is_whole(seed, 0) for seed in seeds):
                 raise SettingError("seeds", seeds, f"{missions} whole numbers ≥ 0")
         self.scenario = self.vector_env.scenario
         self._first_seeds = None if seeds is None else [int(seed) for seed in seeds]

@@ -201,6 +201,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             CallOrderError: There was no reset, or missions are over and nothing starts them anew.
             ActionError: The actions have the wrong shape or type, are not finite or outside their
                 space. Nothing has changed then.
+            WorldError: Missions start anew in a world whose file has changed. Nothing has changed then.
         """
         if min(self.missions.episodes) < 0:
             raise CallOrderError("step before reset: call reset() first")
@@ -211,6 +212,8 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
             raise CallOrderError(
                 f"step after the end of missions {over.tolist()}: reset them with a reset_mask"
             )
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            self.missions.check_world_file()  # a mission that ends in this step starts anew within it
         drawn = self.missions.draw(over.tolist(), [None] * len(over))
         before = self._rewards.before(self.missions)
         self.missions.step(continuous, discrete)

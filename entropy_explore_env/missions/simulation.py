@@ -23,12 +23,13 @@ from entropy_explore_env.randomness import Stream, check_seed, generator
 from entropy_explore_env.robots.range_sensor import true_coverage
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenario import Scenario
-from entropy_explore_env.settings.validation import check_instance, check_whole, is_whole
+from entropy_explore_env.settings.validation import check_instance, is_whole
 from entropy_explore_env.worlds.given import checked_worlds, in_given_worlds
-from entropy_explore_env.worlds.load import world_of_file
+from entropy_explore_env.worlds.load import require_unchanged, world_of_file
 from entropy_explore_env.worlds.world import World
 
 _MOST_MISSIONS = 2**31 - 1
+_MOST_THREADS = 1024
 _ENDS = list(MissionEnd)
 
 
@@ -69,7 +70,8 @@ class Missions:
             SettingError: A count is not a whole number ≥ 1, or all maps do not fit into memory.
             WorldError: The world's file cannot be used, or the given ones differ in their grids.
         """
-        check_whole("threads", 1 if threads is None else threads, 1)
+        if threads is not None and not is_whole(threads, 1, _MOST_THREADS):
+            raise SettingError("threads", threads, f"None, or a whole number from 1 to {_MOST_THREADS}")
         if not is_whole(count, 1, _MOST_MISSIONS):
             raise SettingError("missions", count, f"a whole number ≥ 1, at most {_MOST_MISSIONS}")
         check_instance("scenario", scenario, Scenario)
@@ -164,6 +166,11 @@ class Missions:
             self.draw_episode(mission, *self._episode(mission, seed), fixed)
             for mission, seed, fixed in zip(missions, seeds, given, strict=True)
         ]
+
+    def check_world_file(self) -> None:
+        """Raise a WorldError if the world's file is not what it was when these missions were made."""
+        if self._read is not None:
+            require_unchanged(self.scenario, self._read)
 
     def begin(self, drawn: Iterable[Start]) -> None:
         """Start missions with what was drawn for them."""

@@ -32,7 +32,7 @@ def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     check_instance("scenario", scenario, Scenario)
     if not isinstance(settings, Mapping):
         raise SettingError("settings", settings, "a mapping from names of settings to values")
-    changes = dict(settings)
+    changes = _named(scenario, settings)
     for name in _SHORT:
         if name in changes:
             ending = changes.get("ending", {})
@@ -52,8 +52,19 @@ def _meant(settings: object, name: str, known: Sequence[str]) -> str:
     return did_you_mean(name, known)
 
 
+def _named(settings: object, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """The changes as a dict, if all of their names are texts."""
+    pairs = list(changes.items())
+    for name, value in pairs:
+        if not isinstance(name, str):
+            given = f"{type(settings).__name__}, field {name!r:.100}"
+            raise SettingError(given, value, "a text as the field's name")
+    return dict(pairs)
+
+
 def _replaced(settings: Settings, changes: Mapping[str, Any]) -> Settings:
     """Like dataclasses.replace, into nested parts, with a named error for an unknown field."""
+    changes = _named(settings, changes)
     fields = [f.name for f in dataclasses.fields(settings)]  # type: ignore[arg-type]
     known = [*fields, *(_SHORT if isinstance(settings, Scenario) else ())]
     values: dict[str, Any] = {}

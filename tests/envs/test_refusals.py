@@ -4,15 +4,46 @@ from __future__ import annotations
 
 import math
 import pickle
+from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
 import pytest
+from gymnasium.vector import AutoresetMode
 
-from entropy_explore_env import CallOrderError, SettingError, WorldError, parallel_env
+from entropy_explore_env import (
+    SCENARIOS,
+    CallOrderError,
+    EntropyExploreVectorEnv,
+    SettingError,
+    World,
+    WorldError,
+    env,
+    parallel_env,
+    save_world,
+)
 from entropy_explore_env.envs.conformance import require_same, snapshot
+from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
+from entropy_explore_env.reports.state_values import state_digest
 
 BOX = "box-7x11x5"
 BOX_VOXELS = 7 * 11 * 5
+
+
+class Pairs(Mapping):
+    """A mapping whose keys need no hash."""
+
+    def __init__(self, *pairs: tuple[Any, Any]) -> None:
+        self.pairs = pairs
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+    def __iter__(self):
+        return (key for key, _ in self.pairs)
+
+    def __getitem__(self, key: Any) -> Any:
+        return next(value for one, value in self.pairs if one is key)
 
 
 @pytest.mark.parametrize("seed", [-1, 0.5, "1", True, [1], math.nan])
@@ -50,6 +81,11 @@ def test_bad_seeds_are_refused_and_change_nothing(seed: Any) -> None:
         ({"world": "nowhere.bt"}, "nowhere.bt"),
         ({"render_mode": "ansi"}, "render_mode"),
         ({"ending": 5, "max_cycles": 3}, "ending"),
+        ({"channel": {1: 2}}, "Channel, field 1"),
+        ({"channel": {("a", "b"): 2}}, "Channel, field ('a', 'b')"),
+        ({"channel": {"signal": {None: 2}}}, "Signal, field None"),
+        ({"channel": Pairs(([1], 2))}, "Channel, field [1]"),
+        ({"channel": {"signal": Pairs(({}, 2))}}, "Signal, field {}"),
     ],
 )
 def test_bad_settings_are_named_with_their_value_and_what_is_allowed(
@@ -153,3 +189,47 @@ def test_words_that_are_nearly_right_are_answered_with_the_right_one(asked: Any,
 def test_an_option_of_a_reset_that_is_nearly_right_is_answered_with_the_right_one() -> None:
     with pytest.raises(SettingError, match="did you mean starts"):
         parallel_env(BOX).reset(seed=0, options={"start": None})
+
+
+@pytest.mark.parametrize("threads", [0, 1025, 10**39, 1.0, True])
+def test_threads_are_bounded(threads: Any) -> None:
+    with pytest.raises(SettingError, match=r"threads = .*: allowed is None, or a whole number from 1"):
+        EntropyExploreVectorEnv(BOX, 2, threads=threads)
+
+
+@pytest.mark.parametrize(
+    "seeds", [[[1], [2, 3]], np.zeros((2, 1), int), np.array(3), b"ab", [1, 2.0], {1: 2}]
+)
+def test_seeds_of_rows_are_whole_numbers_one_a_mission(seeds: Any) -> None:
+    with pytest.raises(SettingError, match=r"seeds = .*: allowed is 2 whole numbers"):
+        RobotVecEnv(BOX, 2, seeds=seeds)
+    RobotVecEnv(BOX, 2, seeds=np.array([3, 4]))
+
+
+@pytest.mark.parametrize("call", ["observe", "last", "state", "step"])
+def test_robots_that_act_in_turn_have_begun_before_they_are_asked(call: str) -> None:
+    turns = env(BOX)
+    given = {"observe": ("robot_0",), "step": (None,)}.get(call, ())
+    with pytest.raises(CallOrderError, match=f"{call} before reset"):
+        getattr(turns, call)(*given)
+
+
+def test_a_margin_that_spans_millions_of_voxels_is_refused_at_once() -> None:
+    drifting = {"localization": {"margin_m": 20.0, "xy_m_per_sqrt_m": 0.02}}
+    with pytest.raises(SettingError, match=r"localization.margin_m, in voxel edges = 81.*2,097,152 voxels"):
+        parallel_env("office-3d", robot=drifting)
+
+
+def test_within_a_step_nothing_starts_in_a_file_that_has_gone(tmp_path) -> None:
+    file, same_step = tmp_path / "hall.npz", AutoresetMode.SAME_STEP
+    save_world(World(SCENARIOS[BOX].grid, np.zeros((7, 11, 5), bool), "hall"), file)
+    rows = EntropyExploreVectorEnv(BOX, 2, world=str(file), autoreset_mode=same_step, max_cycles=2)
+    rows.reset(seed=0)
+    rows.step(rows.action_space.sample())
+    before, kept = [state_digest(rows.missions, mission) for mission in range(2)], file.read_bytes()
+    file.unlink()
+    with pytest.raises(WorldError, match=r"hall\.npz"):
+        rows.step(rows.action_space.sample())
+    assert [state_digest(rows.missions, mission) for mission in range(2)] == before
+    file.write_bytes(kept)
+    assert rows.step(rows.action_space.sample())[3].all()

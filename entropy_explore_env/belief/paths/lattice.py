@@ -34,6 +34,9 @@ DIAGONALS = (1.0, round(math.sqrt(2.0) / _GRAIN) * _GRAIN, round(math.sqrt(3.0) 
 So paths of equal length compare equal, and ties do not depend on rounding.
 """
 
+_MOST_OFFSETS = 1 << 21
+"""Of a body's footprint, in the box around it: one of 64 voxels' radius in 3-D, of 700 in a plane."""
+
 _BLOCK_VOXELS = 32
 """Voxels that are classified together: it takes little more time than one, and most are needed soon."""
 
@@ -108,7 +111,7 @@ def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: in
         layer: The only voxel layer that is searched (planar robots); None = all of them.
 
     Raises:
-        SettingError: The radius is no finite number ≥ 0, or there is no such layer.
+        SettingError: The radius is no finite number ≥ 0 or too large, or there is no such layer.
     """
     if not (0.0 <= body_radius < math.inf):
         raise SettingError("body_radius", body_radius, "a finite number ≥ 0, in voxel edges")
@@ -116,28 +119,30 @@ def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: in
         raise SettingError("layer", layer, f"None or a whole number from 0 to {shape[2] - 1}")
     layer = 0 if shape[2] == 1 else layer
     body = _footprint(shape, body_radius, layer)
-    extent = max((max(offset) for offset in body), default=0)
+    extent = int(body.max(initial=0))
     strides = np.array([shape[1] * shape[2], shape[2], 1], np.int64)
     steps: list[tuple[int, ...]] = [
         s for s in itertools.product((-1, 0, 1), repeat=3) if any(s) and (layer is None or s[2] == 0)
     ]
     steps.sort(key=lambda s: sum(map(abs, s)))
-    moves, offsets = np.zeros(len(steps), MOVE), list(body)
+    moves, offsets = np.zeros(len(steps), MOVE), [body]
+    first = len(body)
     for move, step in zip(moves, steps, strict=True):
-        new = [o for o in body if tuple(np.add(o, step).tolist()) not in body]
+        new = _newly_touched(body, step)
         sides = itertools.product(*({0, axis} for axis in step))
         move["step"], move["code"], move["offset"] = step, _code(step), np.dot(strides, step)
         move["length"] = DIAGONALS[sum(map(abs, step)) - 1]
         move["needs"] = sum(1 << steps.index((x, y, z)) for x, y, z in sides if x or y or z)
-        move["first"], move["last"] = len(offsets), len(offsets) + len(new)
-        offsets += new
+        move["first"], move["last"] = first, first + len(new)
+        first += len(new)
+        offsets.append(new)
     return Lattice(
         (int(shape[0]), int(shape[1]), int(shape[2])),
         -1 if layer is None else layer,
         moves,
-        np.array([np.dot(strides, offset) for offset in offsets], np.int64),
-        np.array(list(body), np.int64).reshape(len(body), 3),
-        _BLOCK_VOXELS if not body and (layer is None or shape[2] == 1) else 1,
+        np.concatenate(offsets) @ strides,
+        body,
+        _BLOCK_VOXELS if not len(body) and (layer is None or shape[2] == 1) else 1,
         (extent, extent, extent if layer is None else 0),
     )
 
@@ -146,21 +151,32 @@ def _code(step: tuple[int, ...]) -> int:
     return 9 * (step[0] + 1) + 3 * (step[1] + 1) + step[2] + 1
 
 
-def _footprint(
-    shape: tuple[int, int, int], radius: float, layer: int | None
-) -> dict[tuple[int, int, int], None]:
-    """Index offsets of the voxels that a body touches, in order; none if it touches its own voxel only."""
+def _footprint(shape: tuple[int, int, int], radius: float, layer: int | None) -> np.ndarray:
+    """(B, 3) int64 index offsets of the voxels that a body touches; none if it touches its own voxel only.
+
+    They are in lexicographic order.
+    """
     if radius <= 0.5 + 1e-9:
-        return {}
+        return np.zeros((0, 3), np.int64)
     reach = min(math.ceil(radius - 0.5), max(shape))
-    across = range(-reach, reach + 1)
-    layers = across if layer is None else range(max(-reach, -layer), min(reach, shape[2] - 1 - layer) + 1)
-    inside = radius**2 - 1e-9
-    return {
-        (x, y, z): None
-        for x, y, z in itertools.product(across, across, layers)
-        if sum(max(abs(axis) - 0.5, 0.0) ** 2 for axis in (x, y, z)) < inside
-    }
+    low, high = (-reach, reach) if layer is None else (max(-reach, -layer), min(reach, shape[2] - 1 - layer))
+    across, up = np.arange(-reach, reach + 1), np.arange(low, high + 1)
+    if len(across) ** 2 * len(up) > _MOST_OFFSETS:
+        allowed = f"less, so that the body and its margin touch at most {_MOST_OFFSETS:,} voxels of this grid"
+        raise SettingError("body_radius_m with localization.margin_m, in voxel edges", radius, allowed)
+    far_x, far_z = (np.maximum(np.abs(axis) - 0.5, 0.0) ** 2 for axis in (across, up))
+    touched = far_x[:, None, None] + far_x[:, None] + far_z < radius**2 - 1e-9
+    return np.ascontiguousarray(np.argwhere(touched) + np.array([-reach, -reach, low]))
+
+
+def _newly_touched(body: np.ndarray, step: tuple[int, ...]) -> np.ndarray:
+    """The offsets of a body that after a step are at none of its former places."""
+    if not len(body):
+        return body
+    low = body.min(axis=0) - 1
+    touched = np.zeros(body.max(axis=0) - low + 2, np.bool_)
+    touched[tuple((body - low).T)] = True
+    return body[~touched[tuple((body + step - low).T)]]
 
 
 def belief_costs(
