@@ -24,7 +24,7 @@ from entropy_explore_env import (
 )
 from entropy_explore_env.envs.conformance import require_same, snapshot
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
-from entropy_explore_env.reports.state_values import state_digest
+from entropy_explore_env.reports.state_digest import state_digest
 
 BOX = "box-7x11x5"
 BOX_VOXELS = 7 * 11 * 5
