@@ -17,8 +17,8 @@ from typing import Any
 import llvmlite.binding as llvm
 
 from entropy_explore_env.compilation import announcement, cache, helper
-from entropy_explore_env.compilation.claims import Claim, claim
 from entropy_explore_env.compilation.folder import kernel_folder
+from entropy_explore_env.compilation.locks import Claim, claim
 from entropy_explore_env.compilation.numba_parts import (
     UNUSED_PASSES,
     AnalysisPass,

@@ -21,7 +21,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import IO, Any
 
-from entropy_explore_env.compilation import claims
+from entropy_explore_env.compilation import locks
 from entropy_explore_env.compilation.folder import kernel_folder
 from entropy_explore_env.compilation.numba_parts import config, dumps
 
@@ -72,7 +72,7 @@ def send(kernels: Iterable[tuple[Any, tuple[Any, ...]]], *, start: bool = False)
 def _is_wanted() -> bool:
     """Whether a second process has a processor to run on, and can tell this one what it compiled."""
     main = multiprocessing.parent_process() is None and not _helper.serving
-    return main and claims.fcntl is not None and kernel_folder() is not None and _processors() > 1
+    return main and locks.fcntl is not None and kernel_folder() is not None and _processors() > 1
 
 
 def _processors() -> int:

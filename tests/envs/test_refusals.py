@@ -193,7 +193,7 @@ def test_an_option_of_a_reset_that_is_nearly_right_is_answered_with_the_right_on
 
 @pytest.mark.parametrize("threads", [0, 1025, 10**39, 1.0, True])
 def test_threads_are_bounded(threads: Any) -> None:
-    with pytest.raises(SettingError, match=r"threads = .*: allowed is None, or a whole number from 1"):
+    with pytest.raises(SettingError, match=r"threads = .*.*None, or a whole number from 1"):
         EntropyExploreVectorEnv(BOX, 2, threads=threads)
 
 
@@ -201,7 +201,7 @@ def test_threads_are_bounded(threads: Any) -> None:
     "seeds", [[[1], [2, 3]], np.zeros((2, 1), int), np.array(3), b"ab", [1, 2.0], {1: 2}]
 )
 def test_seeds_of_rows_are_whole_numbers_one_a_mission(seeds: Any) -> None:
-    with pytest.raises(SettingError, match=r"seeds = .*: allowed is 2 whole numbers"):
+    with pytest.raises(SettingError, match=r"seeds = .*2 whole numbers"):
         RobotVecEnv(BOX, 2, seeds=seeds)
     RobotVecEnv(BOX, 2, seeds=np.array([3, 4]))
 

@@ -7,11 +7,11 @@ import sys
 import threading
 import time
 
-from entropy_explore_env.compilation import claims
-from entropy_explore_env.compilation.claims import claim
+from entropy_explore_env.compilation import locks
+from entropy_explore_env.compilation.locks import claim
 from tests.systems import needs_posix
 
-HOLD = "import sys; from pathlib import Path; from entropy_explore_env.compilation.claims import claim\n"
+HOLD = "import sys; from pathlib import Path; from entropy_explore_env.compilation.locks import claim\n"
 HOLD += "held = claim(Path(sys.argv[1])); print('held', flush=True); sys.stdin.read()"
 
 
@@ -46,10 +46,10 @@ def test_a_process_that_dies_lets_go(tmp_path):
 def test_nobody_waits_for_ever_nor_where_there_are_no_locks(tmp_path, monkeypatch):
     kernel = tmp_path / "a.kernel"
     first = claim(kernel)
-    monkeypatch.setattr(claims, "_PATIENCE_S", 0.05)
+    monkeypatch.setattr(locks, "_PATIENCE_S", 0.05)
     claim(kernel).release()
-    monkeypatch.setattr(claims, "_PATIENCE_S", 1e6)
-    monkeypatch.setattr(claims, "fcntl", None)
+    monkeypatch.setattr(locks, "_PATIENCE_S", 1e6)
+    monkeypatch.setattr(locks, "fcntl", None)
     claim(kernel).release()
     first.release()
 
