@@ -12,6 +12,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import numpy as np
+
 from baselines.cli.arguments import make_folder, print_json
 from baselines.cli.progress import named, print_table
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -21,7 +23,7 @@ from entropy_explore_env.interop.map_files import save_map
 from entropy_explore_env.interop.team_maps import joint_map
 from entropy_explore_env.reports.animation import Film, animate, write_video
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.reports.mission_record import CommandRecorder, save_record
+from entropy_explore_env.reports.mission_record import MOST_MAP_VOXELS, RESULTS, CommandRecorder, save_record
 from entropy_explore_env.reports.painting import Painter
 from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.reports.rerun_view import RerunView
@@ -190,7 +192,7 @@ class MissionLog:
         kept = wanted.out / "mission.npz" if wanted.out is not None and wanted.recorded else None
         for file in (kept, wanted.record):
             if file is not None:
-                save_record(self.commands.record(figures["strategy"]), file)
+                save_record(self.commands.record(figures["strategy"], self._results()), file)
                 written.append(file)
         if self._rerun is not None:
             self._rerun.finish()
@@ -199,6 +201,15 @@ class MissionLog:
             self._bag.finish()
             written.append(self._bag.path)
         return written
+
+    def _results(self) -> dict[str, np.ndarray]:
+        """What a record keeps for people: poses at all moments, and the team's map now."""
+        recorder = self.recorder
+        arrays = [recorder.time_s, recorder.poses]
+        if recorder.missions.grid.voxels <= MOST_MAP_VOXELS:
+            team_map = joint_map(recorder.missions)
+            arrays += [team_map.mean, team_map.precision]
+        return dict(zip(RESULTS, arrays, strict=False))
 
     def _write_folder(self, folder: Path, figures: dict[str, Any]) -> list[Path]:
         """The figures with their series, and the picture of curves and maps."""

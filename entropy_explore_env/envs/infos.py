@@ -28,7 +28,7 @@ def end_figures(figures: Mapping[str, Any]) -> dict[str, float]:
     return {name: math.nan if figures[name] is None else float(figures[name]) for name in END_FIGURES}
 
 
-def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
+def robot_infos(missions: Missions, mission: int, texts: bool = True) -> list[dict[str, Any]]:
     """An info for each robot of a mission.
 
     Keys: `deciding` (whether its next action counts), `time_s`, `world_number` (the world's, which `reset`
@@ -40,10 +40,18 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
     also `stopped`, `blind` and `silent`: whether the robot fails so now. Where robots drift also
     `pose_error_m` and `pose_error_rad`: so far off was what the robot believed of its pose
     when it last scanned or decided under way; nobody acts on it.
+
+    Args:
+        missions: The missions.
+        mission: Which.
+        texts: False, for tools that turn all infos into tensors: `move_end` and `end` are the codes of their
+            members, and there is no `figures`.
     """
     clock = missions.state.missions[mission]
     robots = missions.state.robots[mission]
-    time_s, end = float(clock["time_s"]), _MISSION_ENDS[clock["end"]]
+    time_s, end = float(clock["time_s"]), _MISSION_ENDS[clock["end"]] if texts else int(clock["end"])
+    move_ends = _MOVE_ENDS if texts else range(len(_MOVE_ENDS))
+    driving = _UNDER_WAY if texts else MoveEnd.UNDER_WAY.code
     world_number = int(missions.world_numbers[mission])
     infos: list[dict[str, Any]] = [
         {
@@ -53,7 +61,7 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
             "entropy_bits": entropy_bits,
             "own_bits": own_bits,
             "received_bits": received_bits,
-            "move_end": _UNDER_WAY if under_way else _MOVE_ENDS[move_end],
+            "move_end": driving if under_way else move_ends[move_end],
             "end": end,
         }
         for deciding, under_way, entropy_bits, own_bits, received_bits, move_end in zip(
@@ -80,7 +88,7 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
     if missions.scenario.action.by_number:
         for info, mask in zip(infos, missions.action_masks()[mission], strict=True):
             info["action_mask"] = mask
-    if clock["end"]:
+    if clock["end"] and texts:
         for info in infos:
             info["figures"] = mission_figures(missions, mission)
             info |= end_figures(info["figures"])

@@ -28,6 +28,7 @@ from entropy_explore_env.missions.view import RobotView, view_of
 from entropy_explore_env.reports.painting import FRAMES_PER_S, Painter, check_render_mode, offered_modes
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import find_scenario
+from entropy_explore_env.settings.validation import check_instance
 from entropy_explore_env.worlds.given import with_given_worlds
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         *,
         reward_function: RewardFunction | None = None,
         every_reset: Mapping[str, Any] | None = None,
+        text_infos: bool = True,
         **settings: Unpack[ScenarioSettings],
     ) -> None:
         """Make the environment; `reset` starts a mission.
@@ -74,6 +76,8 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
             render_mode: None, "human" or "rgb_array".
             reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
             every_reset: `starts` and `world` of all missions, for resets that do not say them.
+            text_infos: Whether infos hold texts (names of ends, and `figures` at a mission's end); False for
+                tools that turn all infos into tensors: see `envs.infos.robot_infos`.
             **settings: Fields of the Scenario to change; `world` may also be a World, a sequence of
                 them, or a mapping of a file's `path` and options: see `worlds.given`.
 
@@ -82,6 +86,8 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
             WorldError: The world cannot be used.
         """
         check_render_mode(render_mode)
+        check_instance("text_infos", text_infos, bool)
+        self._text_infos = text_infos
         asked, given = with_given_worlds(find_scenario(scenario, settings.get("robots")), settings)
         self._rewards = StepRewards(reward_function)
         self.missions = Missions(asked, given=given)
@@ -229,7 +235,11 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         return dict(zip(self.agents, rows, strict=True))
 
     def _infos(self) -> dict[str, dict[str, Any]]:
-        return dict(zip(self.agents, robot_infos(self.missions, 0), strict=True))
+        return dict(zip(self.agents, robot_infos(self.missions, 0, self._text_infos), strict=True))
+
+    def __repr__(self) -> str:
+        """Its scenario, its team and its voxels."""
+        return f"EntropyExploreEnv({self.scenario.in_short})"
 
     def joint_map(self) -> Map:
         """What the team knows together: see `interop.team_maps.joint_map`; for files, `interop.map_files`.
@@ -257,6 +267,7 @@ def parallel_env(
     *,
     reward_function: RewardFunction | None = None,
     every_reset: Mapping[str, Any] | None = None,
+    text_infos: bool = True,
     **settings: Unpack[ScenarioSettings],
 ) -> EntropyExploreEnv:
     """A team's mission as a ParallelEnv: see `EntropyExploreEnv`.
@@ -266,6 +277,7 @@ def parallel_env(
         render_mode: None, `rgb_array` or `human`.
         reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
         every_reset: `starts` and `world` of all missions, for resets that do not say them.
+        text_infos: Whether infos hold texts; see `EntropyExploreEnv`.
         **settings: Fields of the Scenario to change: `robots`, `world` (a recipe, a file, a World, or
             several Worlds dealt to missions in turn: see `worlds.given`),
             `decision_period_s`, `max_cycles`, `time_limit_s`, and its parts `grid`, `robot`, `sensor`,
@@ -273,7 +285,12 @@ def parallel_env(
             each a mapping of some of its fields or a whole object: see `help` of Scenario, Channel, …
     """
     return EntropyExploreEnv(
-        scenario, render_mode, reward_function=reward_function, every_reset=every_reset, **settings
+        scenario,
+        render_mode,
+        reward_function=reward_function,
+        every_reset=every_reset,
+        text_infos=text_infos,
+        **settings,
     )
 
 
@@ -345,11 +362,17 @@ def env(
     *,
     reward_function: RewardFunction | None = None,
     every_reset: Mapping[str, Any] | None = None,
+    text_infos: bool = True,
     **settings: Unpack[ScenarioSettings],
 ) -> TurnTakingEnv:
     """The same as an AECEnv: robots act in turn, and the step is taken when all have."""
     return TurnTakingEnv(
         parallel_env(
-            scenario, render_mode, reward_function=reward_function, every_reset=every_reset, **settings
+            scenario,
+            render_mode,
+            reward_function=reward_function,
+            every_reset=every_reset,
+            text_infos=text_infos,
+            **settings,
         )
     )

@@ -21,7 +21,7 @@ from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.reports.painting import FRAMES_PER_S, Painter, check_render_mode, offered_modes
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import find_scenario
-from entropy_explore_env.settings.validation import is_whole
+from entropy_explore_env.settings.validation import check_instance, is_whole
 from entropy_explore_env.worlds.given import with_given_worlds
 
 if TYPE_CHECKING:
@@ -42,6 +42,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         *,
         reward_function: RewardFunction | None = None,
         every_reset: Mapping[str, Any] | None = None,
+        text_infos: bool = True,
         **settings: Unpack[ScenarioSettings],
     ) -> None:
         """Make the environment; `reset` starts a mission.
@@ -51,6 +52,8 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
             render_mode: None, "human" or "rgb_array".
             reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
             every_reset: `starts` and `world` of all missions, for resets that do not say them.
+            text_infos: Whether infos hold texts (names of ends, and `figures` at a mission's end); False for
+                tools that turn all infos into tensors: see `envs.infos.robot_infos`.
             **settings: Fields of the Scenario to change; `world` may also be a World, a sequence of
                 them, or a mapping of a file's `path` and options: see `worlds.given`.
 
@@ -59,6 +62,8 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
             WorldError: The world cannot be used.
         """
         check_render_mode(render_mode)
+        check_instance("text_infos", text_infos, bool)
+        self._text_infos = text_infos
         robots = settings.get("robots", 1)
         if not is_whole(robots, 1, 1):
             raise SettingError("robots", robots, "1; parallel_env() takes a team")
@@ -84,7 +89,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         super().reset(seed=None if seed is None else check_seed(seed))
         self.missions.begin(drawn)
         self._painter.watch(self.missions)
-        return self._observation(), robot_infos(self.missions, 0)[0]
+        return self._observation(), robot_infos(self.missions, 0, self._text_infos)[0]
 
     def step(self, action: object) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Advance by one step; see `EntropyExploreEnv.step`."""
@@ -104,7 +109,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
             reward,
             end.reached_goal,
             truncated,
-            robot_infos(self.missions, 0)[0],
+            robot_infos(self.missions, 0, self._text_infos)[0],
         )
 
     def _observation(self) -> np.ndarray | dict[str, np.ndarray]:
@@ -123,6 +128,10 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         if self.missions.episodes[0] < 0:
             raise CallOrderError("view before reset: call reset() first")
         return view_of(self.missions, 0, 0)
+
+    def __repr__(self) -> str:
+        """Its scenario and its voxels."""
+        return f"SingleRobotEnv({self.scenario.in_short})"
 
     def render(self) -> Any:  # noqa: ANN401 - Gymnasium's signature
         """The picture of this moment, (480, 640, 3) uint8 for `rgb_array`."""

@@ -11,7 +11,7 @@ import numpy as np
 from entropy_explore_env.missions.faults import fault_counts
 from entropy_explore_env.missions.localization import localization_figures
 from entropy_explore_env.missions.poses import driven_metres
-from entropy_explore_env.missions.records import COUNTED, SEEN_MARKS
+from entropy_explore_env.missions.records import COUNTED, SEEN_MARKS, MissionEnd
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.robots.range_sensor import (
     Return,
@@ -43,9 +43,11 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
             where the scenario tracks the truth.
 
     Returns:
-        `scenario`, `world`, `robots`, `seed`, `finished`, `end_reason`; `t_mission_s`, and `t50_s`, `t90_s`,
-        `t99_s`: when the best map had lost that share of the bits that the mission asks for; `scans`, and
-        `scans_over_floor`: over `information_floor`; `measurements`, `shared_measurements`, `overlap`:
+        `scenario`, `world`, `robots`, `seed`, `finished`, `end_reason`; `ended_by`: whose maps were good
+        enough, names of robots, or `["team"]` where what all have seen together was; `t_mission_s`, and
+        `t50_s`, `t90_s`, `t99_s`: when the best map had lost that share of the bits that the mission asks
+        for; `scans`, and `scans_over_floor`: over `information_floor`; `measurements`,
+        `shared_measurements`, `overlap`:
         the share of measurements that added their own robot less than I_min; `bits_sent`,
         `bits_received`, `bits_gained_per_bit_sent`: taken from teammates' maps over sent;
         `messages_lost`; `entropy_start_bits`, `entropy_threshold_bits`, `entropy_end_bits`,
@@ -68,6 +70,7 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
         "seed": missions.seeds[mission],
         "finished": end.reached_goal,
         "end_reason": end.name,
+        "ended_by": _ended_by(missions, mission),
         "t_mission_s": float(clock["time_s"]),
         **{f"t{mark}_s": _reached(clock, place) for place, mark in enumerate((50, 90, 99))},
         "scans": scans,
@@ -91,6 +94,23 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
         **({"joint": joint_figures(missions, mission)} if missions.scenario.track_truth else {}),
         "per_robot": [{name: robot[name].item() for name in COUNTED} for robot in robots],
     }
+
+
+def _ended_by(missions: Missions, mission: int) -> list[str]:
+    """Whose maps were good enough when the mission came to what it asks for; empty where it did not."""
+    end, scenario, faults = missions.over(mission), missions.scenario, missions.state.faults[mission]
+    if not end.reached_goal:
+        return []
+    if end is MissionEnd.MAPPED:
+        left_bits = missions.state.robots[mission]["entropy_bits"]
+        passed = left_bits <= missions.state.missions[mission]["entropy_end_bits"]
+    elif scenario.ending.termination != "shared":
+        return ["team"]
+    else:
+        passed = np.ones(scenario.robots, np.bool_)
+        if len(faults):
+            passed &= ~(faults["stopped"] & np.isinf(faults["stop_until_s"]))
+    return [name for name, own in zip(scenario.agents, passed, strict=True) if own]
 
 
 def localization_told(missions: Missions, mission: int) -> dict[str, float | int | None]:

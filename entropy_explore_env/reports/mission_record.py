@@ -3,15 +3,18 @@
 An `.npz` without pickled objects. Its entry `head` is JSON in UTF-8, of the form of `Head`; beside it lie
 `commands` ((T, A, N) floating-point or (T, A) whole numbers, exactly as given), `scan_s` and `scan_robot`
 (S,), `checksum` (SHA-256 of all other entries) and, only where they were given, `starts` (A, 5) and `world`,
-the bytes that `save_world` writes. Files of any other version are refused.
+the bytes that `save_world` writes. For people there may be results, which no replay needs: `time_s` (T + 1,)
+and `poses` (T + 1, A, 5) at the reset and after each step, `joint_mean` and `joint_precision` (X, Y, Z), the
+team's map at the end, of worlds of up to MOST_MAP_VOXELS. Files of any other version are refused.
 """
 
 from __future__ import annotations
 
 import io
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any
 
 import msgspec
@@ -35,7 +38,11 @@ from entropy_explore_env.writing import write_atomically
 FORMAT = "entropy_explore_env mission"
 FORMAT_VERSION = 4
 MAX_FILE_BYTES = 1 << 30
-_ENTRIES = {"head", "commands", "scan_s", "scan_robot", "starts", "world", "checksum"}
+RESULTS = ("time_s", "poses", "joint_mean", "joint_precision")
+"""Entries for people."""
+MOST_MAP_VOXELS = 1 << 24
+"""Of worlds with more voxels than this a record holds no map."""
+_ENTRIES = {"head", "commands", "scan_s", "scan_robot", "starts", "world", "checksum", *RESULTS}
 _Text = Annotated[str, msgspec.Meta(max_length=1 << 20)]
 _Digest = Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")]
 
@@ -82,6 +89,7 @@ class MissionRecord:
         starts: (A, 5) float64 poses that the reset was given; None = drawn.
         reward_function: Qualified name of the function that rewarded the robots; empty = the scenario's
             reward did. It has no part in the state: a replay does not need it.
+        results: The arrays of RESULTS by name; empty = left out. A replay does not need them.
 
     Records compare and hash by identity: two of them are equal only if they are the same object.
     """
@@ -100,6 +108,7 @@ class MissionRecord:
     world_number: int | None = None
     starts: np.ndarray | None = None
     reward_function: str = ""
+    results: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 class CommandRecorder:
@@ -129,8 +138,14 @@ class CommandRecorder:
             self._scan_robot += [int(robot)] * new
         self._scans = robots["scans"].copy()
 
-    def record(self, strategy: str = "") -> MissionRecord:
+    def record(
+        self, strategy: str = "", results: Mapping[str, np.ndarray] = MappingProxyType({})
+    ) -> MissionRecord:
         """The record of the mission so far.
+
+        Args:
+            strategy: What chose the commands.
+            results: What is kept for people: see RESULTS.
 
         Raises:
             CallOrderError: The mission was never reset.
@@ -153,6 +168,7 @@ class CommandRecorder:
             world_number=number,
             starts=None if starts is None else starts.copy(),
             reward_function=missions.reward_function,
+            results=dict(results),
         )
 
     def _table(self) -> np.ndarray:
@@ -239,6 +255,7 @@ def save_record(record: MissionRecord, path: Path | str) -> None:
         "commands": record.commands,
         "scan_s": record.scan_s,
         "scan_robot": record.scan_robot,
+        **record.results,
     }
     if record.world is not None:
         entries["world"] = np.frombuffer(world_bytes(record.world), np.uint8)
@@ -306,9 +323,13 @@ def _record(head: Head, entries: Mapping[str, np.ndarray]) -> MissionRecord:
         ("scan_s", np.float64, (scans,)),
         ("scan_robot", np.int64, (scans,)),
         ("starts", np.float64, (scenario.robots, 5)),
+        ("time_s", np.float64, (steps + 1,)),
+        ("poses", np.float64, (steps + 1, scenario.robots, 5)),
+        ("joint_mean", np.float32, scenario.grid.shape),
+        ("joint_precision", np.float32, scenario.grid.shape),
     ):
         array = entries.get(name)
-        there = array is not None or name == "starts"
+        there = array is not None or name in ("starts", *RESULTS)
         _require(there and (array is None or (array.dtype == kind and array.shape == shape)), name)
     world = world_from_bytes(entries["world"].tobytes()) if "world" in entries else None
     _require(world is not None or scenario.world != GIVEN, "world")
@@ -328,6 +349,7 @@ def _record(head: Head, entries: Mapping[str, np.ndarray]) -> MissionRecord:
         world_number=head.world_number,
         starts=entries.get("starts"),
         reward_function=head.reward_function,
+        results={name: entries[name] for name in RESULTS if name in entries},
     )
 
 

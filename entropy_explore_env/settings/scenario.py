@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.settings.action import Action
 from entropy_explore_env.settings.channel import Channel
 from entropy_explore_env.settings.ending import SIGMA_PRIOR, Ending
@@ -321,6 +321,17 @@ class Scenario:
         """Height z, in the map frame, of the plane in which a robot of the team stays; None if it flies."""
         layer = self.layer_of(self.kind_of(robot).robot)
         return None if layer is None else float(self.grid.centre_of(np.array([0, 0, layer]))[2])
+
+    @property
+    def in_short(self) -> str:
+        """Name, team and voxels in one line."""
+        x, y, z = self.grid.shape
+        team = counted(self.robots, "robot")
+        return f"{self.name!r}, {team}, {x} × {y} × {z} voxels of {self.grid.voxel_size_m:g} m"
+
+    def __repr__(self) -> str:
+        """Name, team and voxels; `settings_of` gives all settings."""
+        return f"Scenario({self.in_short})"
 
     @cached_property
     def agents(self) -> tuple[str, ...]:

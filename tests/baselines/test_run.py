@@ -575,6 +575,9 @@ def test_an_interrupted_process_writes_what_was_done_and_ends_with_130(tmp_path)
     assert err.endswith(f"interrupted after {figures['t_mission_s']:,.1f} s of the mission\n")
     assert sorted(path.name for path in tmp_path.iterdir()) == FILES
     assert run_command(replay.main, [str(tmp_path / "mission.npz"), "--json"]) == 0  # the same end, again
+    results = load_record(tmp_path / "mission.npz").results
+    assert results["time_s"][-1] == figures["t_mission_s"] and len(results["poses"]) == len(results["time_s"])
+    assert (results["joint_precision"] > 0.0).all() and figures["ended_by"] == []
 
 
 def test_the_mission_s_end_is_said_by_its_name():

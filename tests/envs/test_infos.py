@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from entropy_explore_env import EntropyExploreEnv, RobotView, parallel_env
+from entropy_explore_env import (
+    EntropyExploreEnv,
+    MissionEnd,
+    MoveEnd,
+    RobotView,
+    SettingError,
+    parallel_env,
+)
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.settings.grid import Grid
 from tests.reference.scenes import SMALL
@@ -176,3 +183,48 @@ def test_at_the_end_of_a_scored_mission_infos_say_all_figures() -> None:
     whole = {"entropy_bits", "explored", "error", "wrong", "unseen_free_voxels", "driven_m"}
     assert first["scans_over_floor"] > 0 and set(first["joint"]) == whole | marks
     assert mission_figures(env.missions, 0, floor=False)["scans_over_floor"] is None
+
+
+def test_infos_without_texts_are_numbers_and_masks():
+    env = EntropyExploreEnv(BOX, text_infos=False, action=DISCRETE, ending={"max_cycles": 3})
+    texts = EntropyExploreEnv(BOX, action=DISCRETE, ending={"max_cycles": 3})
+    (_, infos), (_, named) = env.reset(seed=0), texts.reset(seed=0)
+    while env.agents:
+        for agent, info in infos.items():
+            assert all(isinstance(value, bool | int | float | np.ndarray) for value in info.values())
+            assert list(MoveEnd)[info["move_end"]].name == named[agent]["move_end"]
+        actions = {agent: 0 for agent in env.agents}
+        infos, named = env.step(actions)[4], texts.step(actions)[4]
+    assert list(MissionEnd)[infos["robot_0"]["end"]] is MissionEnd.CYCLES_UP
+    assert "figures" in named["robot_0"] and "figures" not in infos["robot_0"]
+    with pytest.raises(SettingError, match="text_infos"):
+        EntropyExploreEnv(BOX, text_infos="no")
+
+
+@pytest.mark.parametrize(
+    ("ending", "named"),
+    [
+        ({"sigma_end": 20.0}, {"robot_0"}),
+        ({"sigma_end": 20.0, "termination": "all"}, {"robot_0", "robot_1"}),
+        ({"seen_share": 0.01}, {"team"}),
+        ({"seen_share": 0.01, "termination": "shared"}, {"robot_0", "robot_1"}),
+        ({"max_cycles": 1}, set()),
+    ],
+)
+def test_figures_say_whose_maps_ended_the_mission(ending, named):
+    env = EntropyExploreEnv(BOX, robots=2, channel={"burst": 0}, ending={"time_limit_s": 500.0, **ending})
+    env.reset(seed=0)
+    for agent in env.agents:
+        env.action_space(agent).seed(0)
+    while env.agents:
+        _, _, _, _, infos = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+    ended_by = infos["robot_0"]["figures"]["ended_by"]
+    assert set(ended_by) == named or (
+        ending.get("termination") is None and "sigma_end" in ending and ended_by
+    )
+
+
+def test_environments_and_scenarios_are_shown_in_a_line():
+    env = EntropyExploreEnv(BOX, robots=2)
+    said = f"'{BOX}', 2 robots, 7 × 11 × 5 voxels of {env.scenario.grid.voxel_size_m:g} m"
+    assert repr(env) == f"EntropyExploreEnv({said})" and repr(env.scenario) == f"Scenario({said})"

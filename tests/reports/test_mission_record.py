@@ -416,3 +416,28 @@ def test_missions_after_their_end_are_recorded_as_they_ended():
     recorder = CommandRecorder(missions)
     wander(missions, 30, 0, lambda _: recorder.note())
     assert (recorder.record().scan_s <= 5.0).all() and len(recorder.record().scan_s) > 2
+
+
+@pytest.mark.parametrize("wrong", [None, "poses", "joint_mean"])
+def test_results_for_people_come_back_or_are_refused(wrong, tmp_path):
+    missions = started(free_box(), seed=3)
+    recorder, poses = CommandRecorder(missions), np.zeros((1, missions.scenario.robots, 5))
+    maps = np.full((2, *missions.grid.shape), 0.25, np.float32)
+    results = {"time_s": np.zeros(1), "poses": poses, "joint_mean": maps[0], "joint_precision": maps[1]}
+    if wrong is not None:
+        results[wrong] = results[wrong][:, :1]
+    save_record(recorder.record(results=results), tmp_path / "kept.npz")
+    if wrong is not None:
+        with pytest.raises(RecordError, match=wrong):
+            load_record(tmp_path / "kept.npz")
+        return
+    kept = load_record(tmp_path / "kept.npz")
+    assert kept.results.keys() == set(results)
+    assert all((kept.results[name] == results[name]).all() for name in results)
+    assert load_record_without(tmp_path, recorder).results == {}
+
+
+def load_record_without(folder, recorder):
+    """The same record, without results."""
+    save_record(recorder.record(), folder / "bare.npz")
+    return load_record(folder / "bare.npz")
