@@ -120,21 +120,6 @@ def new_tree(data: np.ndarray, levels: int) -> Tree:
     )
 
 
-def tree_bytes(voxels: int) -> int:
-    """Bytes that no tree of so many voxels exceeds: if all decisions count as equally likely.
-
-    Fewer than two nodes a voxel are told by three decisions each at most, and each of them that is a leaf by
-    25 more: 31 bits a voxel. A 256th more is what rounding may cost.
-    """
-    return 4 * voxels + voxels // 64 + 16
-
-
-@inlined_kernel
-def is_known(precision):
-    """Whether a precision is worth sending: σ is within what a leaf can say."""
-    return precision >= _LEAST_PRECISION
-
-
 @lean_kernel
 def begin_walk(tree, size, low, high):
     """Begin with the whole map.
@@ -251,7 +236,7 @@ def fill_levels(walk, mean, precision, levels):
             row = (i * size[1] + j) * size[2]
             for voxel in range(row + low[2], row + high[2]):
                 level = np.uint8(min(int(mean[voxel] * np.float32(_GREY_LEVELS)), _GREY_LEVELS - 1))
-                levels[voxel] = level if is_known(precision[voxel]) else _UNKNOWN
+                levels[voxel] = level if precision[voxel] >= _LEAST_PRECISION else _UNKNOWN
 
 
 @lean_kernel

@@ -9,12 +9,11 @@ import pytest
 
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.landmark_score import landmark_score
-from entropy_explore_env.errors import RecordError, SettingError
+from entropy_explore_env.errors import RecordError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.state_digest import state_digest
-from entropy_explore_env.settings.fiducials import Fiducials
 from entropy_explore_env.settings.grid import Grid
 from tests.missions.test_tick import toward
 from tests.reference.scenes import build, free_box, put, started, wander
@@ -187,19 +186,3 @@ def test_a_landmark_that_was_chosen_at_the_edge_of_the_workspace_may_be_beyond_i
     arrays["landmarks"]["seen_from"][0, 1, 2, 0] = missions.grid.origin_m[0] - 1e-12
     restore(missions, arrays)
     assert missions.state.landmarks["seen_from"][0, 1, 2, 0] < missions.grid.origin_m[0]
-
-
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("own_number", -1),
-        ("own_number", 65),
-        ("own_number", 1.5),
-        ("own_score", -0.1),
-        ("own_score", 2.1),
-        ("own_apart_m", float("nan")),
-    ],
-)
-def test_settings_are_refused_by_name(field, value):
-    with pytest.raises(SettingError, match=rf"Fiducials\.{field}"):
-        Fiducials(**{field: value})

@@ -24,7 +24,6 @@ from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.robots.channel import BITS_PER_BATCH, BITS_PER_COVARIANCE, BITS_PER_MEASUREMENT
 from entropy_explore_env.settings.changes import with_settings
-from entropy_explore_env.settings.fiducials import Fiducials
 from entropy_explore_env.settings.json import scenario_from_json, settings_json
 from entropy_explore_env.settings.localization import Localization
 from entropy_explore_env.worlds.load import make_world
@@ -369,34 +368,6 @@ def test_fiducials_where_none_can_be_are_refused_before_anything_changes():
         many.reset(0, 1)
     object.__setattr__(many.scenario.fiducials, "number", 200)
     assert state_digest(many, 0) == before
-
-
-@pytest.mark.parametrize(
-    ("kind", "field", "value"),
-    [
-        (Localization, "xy_m_per_sqrt_m", -0.1),
-        (Localization, "z_m_per_sqrt_m", math.inf),
-        (Localization, "yaw_rad_per_sqrt_m", math.nan),
-        (Localization, "yaw_rad_per_sqrt_rad", 10.1),
-        (Localization, "xy_m_per_sqrt_m", "0.1"),
-        (Localization, "z_m_per_sqrt_m", True),
-        (Fiducials, "number", -1),
-        (Fiducials, "number", 1001),
-        (Fiducials, "number", 2.0),
-        (Fiducials, "positions_m", [(0.0, 0.0)]),
-        (Fiducials, "positions_m", ((0.0, 0.0),)),
-        (Fiducials, "positions_m", ((0.0, 0.0, math.nan),)),
-        (Fiducials, "range_m", 0.0),
-        (Fiducials, "range_sigma_m", 0.0),
-        (Fiducials, "bearing_sigma_rad", -0.1),
-    ],
-)
-def test_other_settings_are_refused_by_name(kind, field, value):
-    with pytest.raises(SettingError) as raised:
-        kind(**{field: value})
-    assert str(raised.value).startswith(f"{kind.__name__}.{field} = ")
-    with pytest.raises(SettingError, match=r"Fiducials.number = 2: expected 0 where positions_m"):
-        Fiducials(number=2, positions_m=((0.0, 0.0, 0.0),))
 
 
 def test_settings_go_through_json_and_exact_robots_cost_nothing():

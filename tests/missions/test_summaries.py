@@ -11,13 +11,11 @@ from hypothesis import strategies as st
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.pooling import Pool, fresh_sums, pool_belief
-from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.summaries import precision_of_place
 from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.robots.localization import pack_covariance
 from entropy_explore_env.robots.map_summary import decode_map, encode_map, is_summary
-from entropy_explore_env.settings.changes import with_settings
 from tests.reference.scenes import drawn, free_box, random_actions, seeds, started, wander
 
 QUIET = {"announcements": False}
@@ -280,18 +278,3 @@ def test_without_summaries_no_state_is_kept_for_them():
         for name in ("own_mean", "own_precision", "summaries", "in_flight_parcels", "in_flight_summaries"):
             assert getattr(missions.state, name).size == 0
         assert missions.rules.params["summary_every_s"][0] == 0.0
-
-
-@pytest.mark.parametrize(
-    ("channel", "field"),
-    [
-        ({"phase_s": 2.0}, "Channel.phase_s"),
-        ({"i_min_fill": 0.5}, "Channel.i_min_fill"),
-        ({"summary_every_s": -1.0}, "Channel.summary_every_s"),
-        ({"summary_threshold_bits": 6.0}, "Channel.summary_threshold_bits"),
-    ],
-)
-def test_what_is_refused(channel, field):
-    with pytest.raises(SettingError) as raised:
-        with_settings(free_box(), {"channel": {**SUMMARIES, **channel}})
-    assert raised.value.field == field

@@ -1,4 +1,4 @@
-"""Films that thin themselves out, and videos read back with PyAV."""
+"""Films that thin themselves out, animations and videos read back, and the window that shows them."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pygame
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from PIL import Image, ImageSequence
 
 from entropy_explore_env.errors import MissingExtraError, SettingError
-from entropy_explore_env.reports.animation import Film, write_video
+from entropy_explore_env.reports.animation import Film, Window, animate, write_video
 from tests.reference.scenes import drawn
 
 
@@ -132,19 +134,98 @@ def test_odd_sizes_lose_a_row_or_a_column(tmp_path):
     assert image.shape == (48, 64, 3)
 
 
-def test_a_video_that_fails_leaves_the_old_file(tmp_path):
-    pytest.importorskip("av")
-    path = tmp_path / "mission.mp4"
+@pytest.mark.parametrize(
+    ("write", "name", "good", "bad"),
+    [(animate, "mission.gif", 0.1, (0.0, float("nan"))), (write_video, "mission.mp4", 10, (0, 2.5))],
+)
+def test_a_film_that_fails_leaves_the_old_file(write, name, good, bad, tmp_path):
+    if write is write_video:
+        pytest.importorskip("av")
+    path = tmp_path / name
     path.write_bytes(b"old")
-    wrong = (([], 10), ([picture(0), picture(0)[:20]], 10), ([picture(0)], 0), ([picture(0)], 2.5))
+    wrong = [([], good), ([picture(0), picture(0)[:20]], good), *(([picture(0)], rate) for rate in bad)]
     for frames, rate in wrong:
         with pytest.raises(SettingError):
-            write_video(frames, path, rate)
+            write(frames, path, rate)
     assert path.read_bytes() == b"old"
-    assert [entry.name for entry in tmp_path.iterdir()] == ["mission.mp4"]
+    assert [entry.name for entry in tmp_path.iterdir()] == [name]
 
 
 def test_without_pyav_the_extra_is_named(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(MissingExtraError, match=r"\[viewer\]"):
         write_video([picture(0)], tmp_path / "a.mp4", 10)
+
+
+def test_animation_has_every_picture_and_one_palette(tmp_path: Path) -> None:
+    pictures, path = [picture(number) for number in range(6)], tmp_path / "mission.gif"
+    animate(iter(pictures), path, 0.05)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["mission.gif"]
+    with Image.open(path) as animation:
+        assert animation.n_frames == 6 and animation.size == (64, 48)
+        assert animation.info["loop"] == 0
+        for nth, shown in enumerate(pictures):
+            animation.seek(nth)
+            assert animation.info["duration"] == 50
+            seen = np.asarray(animation.convert("RGB")).astype(int)
+            assert np.abs(seen - shown).max() <= 8
+
+
+def test_animation_of_more_colours_than_a_palette_holds(tmp_path: Path) -> None:
+    noise = np.random.default_rng(3).integers(0, 256, (50, 70, 3), dtype=np.uint8)
+    animate([noise, noise[::-1]], tmp_path / "noise.gif", 0.02)
+    with Image.open(tmp_path / "noise.gif") as animation:
+        assert animation.n_frames == 2
+
+
+def test_a_webp_has_the_pixels_of_the_gif(tmp_path: Path) -> None:
+    pictures = [picture(number) for number in (0, 5, 10)]
+    shown = []
+    for suffix in ("gif", "webp"):
+        animate(pictures, tmp_path / f"mission.{suffix}", 0.05)
+        with Image.open(tmp_path / f"mission.{suffix}") as animation:
+            shown.append([np.asarray(each.convert("RGB")) for each in ImageSequence.Iterator(animation)])
+    np.testing.assert_array_equal(*shown)
+
+
+def test_window_shows_pictures_and_a_person_can_close_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    window = Window(frames_per_s=None)
+    window.close()
+    first = picture(0)
+    window.show(first)
+    shown = pygame.surfarray.array3d(pygame.display.get_surface()).swapaxes(0, 1)
+    np.testing.assert_array_equal(shown, first)
+    window.show(picture(0, (600, 800)))
+    assert pygame.display.get_surface().get_size() == (800, 600)
+    window.close()
+    assert not pygame.display.get_init()
+    window.show(first)
+    pygame.event.post(pygame.event.Event(pygame.QUIT))
+    window.show(first)
+    assert window.dismissed
+    window.show(first)
+    assert not pygame.display.get_init()
+
+
+def test_without_a_display_one_line_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "none of this name")
+    with pytest.raises(SettingError, match=r"render_mode = 'human': .*\"rgb_array\" .*SDL_VIDEODRIVER=dummy"):
+        Window().show(np.zeros((40, 60, 3), np.uint8))
+
+
+def test_window_holds_its_frame_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    window, picture = Window(frames_per_s=50.0), np.zeros((40, 60, 3), np.uint8)
+    window.show(picture)
+    begin = pygame.time.get_ticks()
+    for _ in range(5):
+        window.show(picture)
+    assert pygame.time.get_ticks() - begin >= 80
+    window.close()
+
+
+def test_without_pygame_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pygame", None)
+    with pytest.raises(MissingExtraError, match=r"\[render\]"):
+        Window()

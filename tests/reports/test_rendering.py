@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
-from pathlib import Path
 
 import numpy as np
-import pygame
 import pytest
-from PIL import Image, ImageDraw, ImageSequence
+from PIL import Image, ImageDraw
 
-from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports import annotations
-from entropy_explore_env.reports.animation import Window, animate
 from entropy_explore_env.reports.annotations import Box, Mark, draw_legend, legend_rows
 from entropy_explore_env.reports.colours import (
     COLOURS,
@@ -78,7 +74,7 @@ def pixel_of(view: View, voxel: tuple[float, float, float]) -> tuple[int, int]:
 
 @pytest.mark.parametrize("shape", WORLDS)
 @pytest.mark.parametrize("robots", [0, 1, 5, 12])
-def test_picture_has_the_wanted_size_and_maps_keep_their_proportions(
+def test_picture_has_the_wanted_size_and_maps_their_proportions_and_places(
     shape: tuple[int, int, int], robots: int
 ) -> None:
     frame = frame_of(shape, robots)
@@ -89,24 +85,19 @@ def test_picture_has_the_wanted_size_and_maps_keep_their_proportions(
         views = views_of(frame, width, height)
         ups = (1,) if shape[2] == 1 else (1, 2)
         assert set(views) == {(quantity, up) for quantity in ("entropy", "coverage") for up in ups}
+        taken = np.zeros((height, width), int)
         for (_, up), view in views.items():
+            taken[view.top : view.top + view.height, view.left : view.left + view.width] += 1
             assert view.left >= 0 and view.top >= 0
             assert view.left + view.width <= width and view.top + view.height <= height
             voxel_px = view.width / shape[0]
             assert abs(view.height - voxel_px * shape[up]) <= 1 + 0.5 * shape[up] / shape[0]
+        assert taken.max() == 1
 
 
 def test_flat_world_has_larger_views_from_above() -> None:
     flat, deep = frame_of((120, 80, 1)), frame_of((120, 80, 60))
     assert views_of(flat)["entropy", 1].width > views_of(deep)["entropy", 1].width
-
-
-def test_maps_do_not_overlap() -> None:
-    for shape in WORLDS:
-        taken = np.zeros((480, 640), dtype=int)
-        for view in views_of(frame_of(shape)).values():
-            taken[view.top : view.top + view.height, view.left : view.left + view.width] += 1
-        assert taken.max() == 1
 
 
 @pytest.mark.parametrize("quantity", ["entropy", "coverage"])
@@ -256,100 +247,6 @@ def test_frame_and_picture_name_what_does_not_fit() -> None:
         draw_frame(frame, 100, 480)
     with pytest.raises(SettingError, match="height"):
         draw_frame(frame, 640, 100)
-
-
-def test_window_shows_pictures_and_a_person_can_close_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    window = Window(frames_per_s=None)
-    window.close()
-    picture = draw_frame(frame_of())
-    window.show(picture)
-    shown = pygame.surfarray.array3d(pygame.display.get_surface()).swapaxes(0, 1)
-    np.testing.assert_array_equal(shown, picture)
-    window.show(draw_frame(frame_of(), 800, 600))
-    assert pygame.display.get_surface().get_size() == (800, 600)
-    window.close()
-    assert not pygame.display.get_init()
-    window.show(picture)
-    pygame.event.post(pygame.event.Event(pygame.QUIT))
-    window.show(picture)
-    assert window.dismissed
-    window.show(picture)
-    assert not pygame.display.get_init()
-
-
-def test_without_a_display_one_line_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SDL_VIDEODRIVER", "none of this name")
-    with pytest.raises(SettingError, match=r"render_mode = 'human': .*\"rgb_array\" .*SDL_VIDEODRIVER=dummy"):
-        Window().show(np.zeros((40, 60, 3), np.uint8))
-
-
-def test_window_holds_its_frame_rate(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
-    window, picture = Window(frames_per_s=50.0), np.zeros((40, 60, 3), np.uint8)
-    window.show(picture)
-    begin = pygame.time.get_ticks()
-    for _ in range(5):
-        window.show(picture)
-    assert pygame.time.get_ticks() - begin >= 80
-    window.close()
-
-
-def test_without_pygame_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "pygame", None)
-    with pytest.raises(MissingExtraError, match=r"\[render\]"):
-        Window()
-
-
-def explored(share: float) -> np.ndarray:
-    """The picture of a box of which this share is known."""
-    frame = frame_of()
-    frame.entropy_share[: round(share * SHAPE[0])] = 0.2
-    frame.coverage[:, : round(share * SHAPE[1])] = share
-    return draw_frame(dataclasses.replace(frame, title=f"{share:.2f}"))
-
-
-def test_animation_has_every_picture_and_one_palette(tmp_path: Path) -> None:
-    pictures, path = [explored(share) for share in np.linspace(0, 1, 6)], tmp_path / "mission.gif"
-    animate(iter(pictures), path, 0.05)
-    assert [entry.name for entry in tmp_path.iterdir()] == ["mission.gif"]
-    with Image.open(path) as animation:
-        assert animation.n_frames == 6 and animation.size == (640, 480)
-        assert animation.info["loop"] == 0
-        for nth, picture in enumerate(pictures):
-            animation.seek(nth)
-            assert animation.info["duration"] == 50
-            seen = np.asarray(animation.convert("RGB")).astype(int)
-            assert np.abs(seen - picture).max() <= 8
-
-
-def test_animation_of_more_colours_than_a_palette_holds(tmp_path: Path) -> None:
-    picture = np.random.default_rng(3).integers(0, 256, (50, 70, 3), dtype=np.uint8)
-    animate([picture, picture[::-1]], tmp_path / "noise.gif", 0.02)
-    with Image.open(tmp_path / "noise.gif") as animation:
-        assert animation.n_frames == 2
-
-
-def test_a_webp_has_the_pixels_of_the_gif(tmp_path: Path) -> None:
-    pictures = [explored(share) for share in (0.0, 0.5, 1.0)]
-    shown = []
-    for suffix in ("gif", "webp"):
-        animate(pictures, tmp_path / f"mission.{suffix}", 0.05)
-        with Image.open(tmp_path / f"mission.{suffix}") as animation:
-            shown.append([np.asarray(each.convert("RGB")) for each in ImageSequence.Iterator(animation)])
-    np.testing.assert_array_equal(*shown)
-
-
-def test_an_animation_that_fails_leaves_the_old_file(tmp_path: Path) -> None:
-    path = tmp_path / "mission.gif"
-    path.write_bytes(b"old")
-    picture = np.zeros((4, 6, 3), np.uint8)
-    wrong = (([], 0.1), ([picture, picture[:2]], 0.1), ([picture], 0.0), ([picture], float("nan")))
-    for frames, frame_s in wrong:
-        with pytest.raises(SettingError):
-            animate(frames, path, frame_s)
-    assert path.read_bytes() == b"old"
-    assert [entry.name for entry in tmp_path.iterdir()] == ["mission.gif"]
 
 
 def test_nothing_of_a_robot_leaves_the_map() -> None:

@@ -134,9 +134,7 @@ def test_a_scan_is_what_the_reference_measures(size, seed, voxel_size_m, max_ran
 
 @drawn(60)
 @given(st.sampled_from(SHAPES), seeds, st.floats(0.0, 2.5), st.sampled_from([0.0, 0.4]))
-def test_returns_nearer_than_the_least_range_measure_nothing_and_all_others_as_before(
-    size, seed, min_range_m, noise_m
-):
+def test_returns_nearer_than_the_least_range_measure_nothing(size, seed, min_range_m, noise_m):
     """Judged by the measured distance; the noise of other rays is the same."""
     rng = np.random.default_rng(seed)
     truth, start = random_cover(size, 0.15, seed), rng.uniform(0.1, 0.9, 3) + rng.integers(0, size)
@@ -374,9 +372,7 @@ def test_visibility_parameters():
 
 @drawn(60)
 @given(st.sampled_from(SHAPES), seeds, st.sampled_from([math.inf, 0.6]), st.integers(0, 2))
-def test_rays_that_end_at_what_gives_no_return_measure_nothing_and_others_all_that_they_did(
-    size, seed, max_range_m, behind
-):
+def test_rays_that_end_at_what_gives_no_return_measure_nothing(size, seed, max_range_m, behind):
     rng = np.random.default_rng(seed)
     truth, start = random_cover(size, 0.15, seed), rng.uniform(0.1, 0.9, 3) + rng.integers(0, size)
     yaw, pitch = rng.uniform(-math.pi, math.pi), rng.uniform(-1.2, 1.2) * (size[2] > 1)

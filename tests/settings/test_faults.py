@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 
 import pytest
 
@@ -15,36 +14,6 @@ from entropy_explore_env.settings.json import scenario_from_json, settings_json
 from entropy_explore_env.settings.scenarios import BOX
 
 TEAM = with_settings(BOX, {"robots": 3})
-
-
-@pytest.mark.parametrize(
-    ("kind", "field", "value"),
-    [
-        (Outage, "at_s", 0.0),
-        (Outage, "mean_s", math.nan),
-        (Outage, "lasts_s", -1.0),
-        (Outage, "robots", (1, 1)),
-        (Outage, "robots", [1]),
-        (Outage, "robots", (-1,)),
-        (Outage, "robots", (True,)),
-        (SensorFault, "lost_rays", 1.1),
-        (SensorFault, "range_factor", 0.0),
-        (SensorFault, "range_bias_m", math.inf),
-        (RadioFault, "garbled", -0.1),
-        (RadioFault, "repeated", 2),
-        (RadioFault, "late", "often"),
-        (RadioFault, "late_s", 0.0),
-        (Faults, "stop", None),
-        (Faults, "sensor", Outage()),
-        (Signal, "exponent", -1.0),
-        (Signal, "budget_db", math.nan),
-        (Signal, "wall_loss_db_per_m", math.inf),
-    ],
-)
-def test_other_values_are_refused_by_name(kind, field, value):
-    with pytest.raises(SettingError) as raised:
-        kind(**{field: value})
-    assert str(raised.value).startswith(f"{kind.__name__}.{field} = ")
 
 
 @pytest.mark.parametrize("part", ["stop", "blind", "silent", "sensor", "radio"])

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import gymnasium
 import numpy as np
 import pettingzoo
 import pytest
 
 from entropy_explore_env import SCENARIOS, EntropyExploreEnv, environment_id, parallel_env
+from entropy_explore_env.settings.scenarios import ROOM
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from tests.reference.scenes import SMALL
 
@@ -61,3 +64,19 @@ def test_splits_reach_the_environment():
         env.reset(seed=0)
         seen.add(env.missions.worlds[0].occupied.tobytes())
     assert len(seen) == 3
+
+
+def test_the_paper_s_parameters():
+    """Tables 1 and 2 of Rocha04."""
+    assert (ROOM.grid.shape, ROOM.grid.voxel_size_m, ROOM.grid.voxels) == ((41, 41, 17), 0.25, 28_577)
+    assert ROOM.grid.centre_of(np.array([0, 0, 0])).tolist() == [0.0, 0.0, 0.0]
+    assert ROOM.grid.centre_of(np.array([40, 40, 16])).tolist() == [10.0, 10.0, 4.0]
+    robot, sensor = ROOM.robot, ROOM.sensor
+    assert (robot.max_speed_m_s, robot.acceleration_m_s2, robot.reach_m) == (0.25, 0.25, 0.5)
+    assert (robot.motion, robot.turn_rate_rad_s) == ("free", math.inf)
+    assert (sensor.sigma_min, sensor.sigma_slope_per_m) == (0.08, 0.006)
+    assert (sensor.field_of_view_rad, sensor.angular_step_rad) == ((math.pi / 6, math.pi / 12), math.pi / 90)
+    assert (sensor.columns, sensor.rows, sensor.rays) == (16, 8, 128)
+    assert (ROOM.sigma_prior, ROOM.ending.sigma_end, ROOM.ending.termination) == (30.0, 0.03, "any")
+    assert (ROOM.channel.burst, ROOM.channel.i_min_bits) == (64, 0.3219)
+    assert (ROOM.channel.loss_probability, ROOM.channel.delay_s, ROOM.channel.range_m) == (0.0, 0.0, math.inf)
