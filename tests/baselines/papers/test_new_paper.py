@@ -12,6 +12,7 @@ import pytest
 
 from baselines import papers
 from baselines.cli.arguments import run_command
+from baselines.experiments.experiment import Amount
 from baselines.experiments.page import Page
 from baselines.papers.__main__ import find_experiment, main
 from entropy_explore_env.errors import SettingError
@@ -187,3 +188,14 @@ def test_every_page_is_short_and_has_its_claims(name):
     results = Path(__file__).parents[3] / "docs" / "results"
     words = (results / f"{name}.md").read_text("utf-8").split()
     assert len(words) <= 1500 and (results / name / "claims.csv").is_file()
+
+
+@pytest.mark.parametrize("name", papers.PAPERS)
+def test_trials_differ_by_what_decides_them_and_a_quick_run_has_some_of_the_cells(name):
+    trials = find_experiment(name).trials
+    whole = trials(Amount(quick=False, seeds=2))
+    keys = [(trial.cell, trial.seed) for trial in whole]
+    cells = {trial.cell: str(trial.settings) for trial in whole if trial.seed == 0}
+    assert len(set(keys)) == len(keys)
+    assert len(cells) - len(set(cells.values())) == (3 if name == "rochami" else 0)  # κ = 0, one change each
+    assert {trial.cell for trial in trials(Amount(quick=True, seeds=2))} <= set(cells)

@@ -16,7 +16,7 @@ from baselines.papers.bhattacharya.measured import split
 from baselines.papers.bhattacharya.run import packed, start_cells, unpacked
 from baselines.papers.bhattacharya.simulation.belief import GridBelief, Readings, Scanner
 from baselines.papers.bhattacharya.simulation.team import Rules, Simulation
-from baselines.papers.bhattacharya.sweep import FLOORS, all_runs
+from baselines.papers.bhattacharya.sweep import FLOORS
 from tests.baselines.papers.pages import run_paper
 from tests.reference.scenes import drawn, seeds
 
@@ -168,13 +168,6 @@ def test_the_command_writes_its_page_and_goes_on_where_it_was(tmp_path, monkeypa
     assert ran.claims["scipy"]["ours"] > 0.0 and "split-band" in ran.claims
     (measured,) = [row.record for row in ran.rows if row.cell == "measured"]
     assert set(measured["splits"]) == {"band", "patch"}
-
-
-def test_runs_differ_by_what_decides_their_results():
-    runs = all_runs(2, 1, 2)
-    assert len({(run.cell, run.seed) for run in runs}) == len(runs)
-    assert len({f"{run.settings} {run.seed}" for run in runs}) == len(runs)
-    assert {run.rules.control for run in runs} == {"projected-centroid", "gradient-search", "nearest"}
 
 
 def test_maps_of_a_record_come_back():

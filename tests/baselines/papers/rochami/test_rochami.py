@@ -9,22 +9,11 @@ import pytest
 
 from baselines.experiments.mission import scripted
 from baselines.experiments.rows import Record
-from baselines.experiments.trials import CellTrial
 from baselines.papers.rochami import EXPERIMENT, sweep
 from baselines.papers.rochami.claims import all_claims, steered_ratio
 from baselines.papers.rochami.mission import TeamCoverage
 from baselines.papers.rochami.sweep import (
-    BLOCKED,
-    CHANGES,
-    FEW,
-    FILLS,
-    I_MINS,
-    KAPPAS,
-    METHODS,
-    SHARING_TEAMS,
-    TEAMS,
     cell_id,
-    change_id,
     kappa_id,
     sharing_id,
 )
@@ -36,36 +25,6 @@ from tests.reference import rochami as reference
 from tests.reference.scenes import as_reference
 
 # --- the cells
-
-
-def test_the_cells_are_the_experiment_s():
-    cells = cells_of(EXPERIMENT, 50)
-    different = {str(CellTrial(cell, 0).settings) for cell in cells.values()}
-    assert len(different) >= len(cells) - 3  # κ = 0 with one thing changed
-    for n in TEAMS:
-        for blocked in BLOCKED:
-            for method in METHODS:
-                cell = cells[cell_id(n, method, blocked)]
-                assert (cell.scenario.robots, cell.scenario.robot.when_blocked) == (n, blocked)
-                assert cell.scenario.channel.announcements == (method == "coordinated")
-                assert (cell.strategy == "random") == (method == "random")
-                if method != "random":
-                    assert cell.record.coordination.coordinated == (method == "coordinated")
-    assert cell_id(1, "coordinated", "wander") == cell_id(1, "uncoordinated") in cells
-    assert all(kappa_id(kappa) in cells for kappa in KAPPAS)
-    assert cells[kappa_id(0.25)].record.coordination.distance_cost == 0.25
-    for name, change in CHANGES.items():
-        for n in FEW:
-            for method in METHODS[:2]:
-                cell = cells[change_id(name, n, method)]
-                if method == "coordinated" or change.both:
-                    base = cells[cell_id(n, method)]
-                    assert (cell.scenario, cell.record) != (base.scenario, base.record)
-    for n in SHARING_TEAMS:
-        assert {cells[sharing_id(n, i)].scenario.channel.i_min_fill for i in I_MINS} == {None}
-        assert [cells[sharing_id(n, fill=f)].scenario.channel.i_min_fill for f in FILLS] == list(FILLS)
-    quick = set(cells_of(EXPERIMENT, 10, quick=True))
-    assert quick < set(cells) and len(quick) < 60
 
 
 # --- claims

@@ -14,51 +14,16 @@ from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.papers import sawhney
 from baselines.papers.sawhney import EXPERIMENT, sweep
 from baselines.papers.sawhney.claims import all_claims, best_beta, changed_table, compared, relative
-from baselines.papers.sawhney.mission import Run
 from baselines.papers.sawhney.sweep import (
-    BETAS,
-    CHANGED_METHODS,
     CHANGES,
     PLANS,
-    POINT,
-    TEAMS,
-    TERRAINS,
-    cell_id,
-    methods,
-    part_of,
 )
 from baselines.papers.sawhney.terrain_model import model_file
-from baselines.strategies.metrics import ExplorationConfig, Metric, Nearest
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.load import load_world
 from tests.baselines.papers.pages import cells_of, run_paper
-
-
-def test_the_cells_are_the_experiment_s():
-    cells = cells_of(EXPERIMENT, 40)
-    assert len({str(CellTrial(cell, 0).settings) for cell in cells.values()}) == len(cells)
-    for world in (*PLANS, *TERRAINS):
-        for n in TEAMS:
-            for beta in BETAS:
-                cell = cells[cell_id(world, n, f"beta-{beta}")]
-                assert cell.record.exploring.metric == Metric(beta * POINT[part_of(world)])
-                assert (cell.scenario.robots, cell.scenario.world) == (n, world)
-                assert cell.seeds == 40
-            assert cells[cell_id(world, n, "ptv")].record.exploring.metric == Metric()
-            assert cells[cell_id(world, n, "sync")].record.exploring.allocation == "synchronous"
-            assert cells[cell_id(world, n, "naive")].record.exploring.frontiers.visibility == "naive"
-            assert cells[cell_id(world, n, "nearest")].record.exploring.metric == Nearest()
-    assert cells[cell_id("terrain", 2, "no-height")].record.exploring.frontiers.gamma is None
-    for part, world in (("plans", "office"), ("terrains", "terrain-rough")):
-        for change in CHANGES[part]:
-            for method in CHANGED_METHODS[part]:
-                changed, base = (cells[cell_id(world, 3, method, c)] for c in (change, None))
-                assert (changed.scenario, changed.record) != (base.scenario, base.record)
-                assert changed.seeds == base.seeds
-    quick = set(cells_of(EXPERIMENT, 4, quick=True))
-    assert quick < set(cells) and len(quick) < 230
 
 
 def synthetic(values, seeds=6):
@@ -178,12 +143,6 @@ def test_a_height_map_takes_the_place_of_the_model(tmp_path):
     assert {trial.point.record.over_model for trial in sweep.experiment(Amount(False, 2))} == {False, True}
     with pytest.raises(SettingError, match="one height map at most"):
         sweep.experiment(Amount(True, 2, tuple(files)))
-
-
-def test_methods_differ_in_plans_and_over_terrain():
-    farther = {f"beta-{beta}" for beta in sweep.FARTHER_BETAS["terrains"]}
-    assert set(methods("terrains", True)) - set(methods("plans", True)) == {"no-height", *farther}
-    assert Run(ExplorationConfig()) == Run(ExplorationConfig()) and sweep.TIME_LIMIT_S == 3600.0
 
 
 def test_the_model_of_jacksboro_is_a_world_to_fly_over():

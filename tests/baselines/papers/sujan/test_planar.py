@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
 from baselines.experiments.trials import CellTrial
 from baselines.papers.sujan import planar
 from baselines.papers.sujan.planar import (
-    CHANGES,
     EXPERIMENT,
     METHODS,
     OTHERS,
@@ -22,22 +19,6 @@ from baselines.papers.sujan.planar import (
     scenario_of,
 )
 from tests.baselines.papers.pages import cells_of, run_paper
-
-
-def test_the_cells_are_the_paper_s():
-    cells = cells_of(EXPERIMENT, 30)
-    assert len(cells) == 2 * len(METHODS) + len(OTHERS) + len(CHANGES)
-    assert len({str(CellTrial(cell, 0).settings) for cell in cells.values()}) == len(cells)
-    for robots, degrees, range_m in ((1, 90.0, 15.0), (2, 75.0, 10.0)):
-        for method, strategy in METHODS.items():
-            cell = cells[cell_id(robots, method)]
-            sensor = cell.scenario.sensor
-            assert (cell.strategy, cell.scenario.robots, cell.seeds) == (strategy, robots, 30)
-            assert math.degrees(sensor.field_of_view_rad[0]) == pytest.approx(degrees)
-            assert sensor.max_range_m == range_m
-            starts = np.array(cell.surroundings.settings()["every_reset"]["starts"])  # type: ignore[union-attr]
-            assert starts.mean(axis=0)[:2] == pytest.approx([50.0, 50.0])
-    assert set(cells_of(EXPERIMENT, 30, quick=True)) < set(cells)
 
 
 def test_a_mission_records_what_is_mapped_and_driven_scan_by_scan(monkeypatch):

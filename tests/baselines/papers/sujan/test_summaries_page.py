@@ -8,7 +8,6 @@ import pytest
 from baselines.papers.sujan.summaries import (
     BURSTS,
     EVERY_S,
-    EXPERIMENT,
     TASKS,
     SharedMaps,
     Task,
@@ -19,8 +18,7 @@ from baselines.papers.sujan.summaries import (
     summary_id,
 )
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.settings.changes import with_settings
-from tests.baselines.papers.pages import cells_of, run_paper
+from tests.baselines.papers.pages import run_paper
 from tests.reference.scenes import free_box
 
 
@@ -59,18 +57,6 @@ def test_claims_by_hand():
     assert not claims["joint-terrain-20"].holds
     over = [{**record(50.0, 1.0, 0.1), "moment": None}]
     assert figure_of(over, "error").tolist() == [9.0]
-
-
-def test_cells_differ_in_the_channel_alone_and_have_the_same_worlds():
-    cells = cells_of(EXPERIMENT, 7)
-    assert len(cells) == len(TASKS) * (len(BURSTS) + len(EVERY_S))
-    for task in TASKS:
-        base = cells[batch_id(task, BURSTS[0])]
-        for name in [batch_id(task, b) for b in BURSTS] + [summary_id(task, s) for s in EVERY_S]:
-            cell = cells[name]
-            same = with_settings(cell.scenario, {"channel": base.scenario.channel})
-            assert (same, cell.strategy, cell.seeds) == (base.scenario, base.strategy, 7)
-            assert cell.scenario.robots == 3 and cell.scenario.shares_summaries == ("summaries" in name)
 
 
 def test_errors_of_maps_by_hand():
