@@ -10,13 +10,13 @@ from PIL import ImageFont
 
 @lru_cache(maxsize=16)
 def font(size: int) -> ImageFont.FreeTypeFont:
-    """The font at a size in pixels."""
+    """Return the font at a size in pixels."""
     return ImageFont.load_default(size)  # type: ignore[return-value] - with a size it is a FreeType font
 
 
 @lru_cache(maxsize=1024)
 def printable(text: str) -> str:
-    """The text in characters that the font has: accents are dropped, other characters become `?`."""
+    """Return the text in characters that the font has: accents are dropped, other characters become `?`."""
     return "".join(_printable_character(character) for character in text)
 
 
@@ -28,13 +28,13 @@ def _printable_character(character: str) -> str:
 
 
 def text_width(text: str, size: int) -> float:
-    """Width of a line of printable text in pixels."""
+    """Return the width of a line of printable text in pixels."""
     return font(size).getlength(text)
 
 
 @lru_cache(maxsize=1024)
 def shortened(text: str, width: float, size: int) -> str:
-    """The text in printable characters, cut off with `…` where it is wider than `width` pixels."""
+    """Return the text in printable characters, cut off with `…` where it is wider than `width` pixels."""
     text = printable(text)
     if text_width(text, size) <= width:
         return text

@@ -32,22 +32,22 @@ class Stream(enum.IntEnum):
 
 
 def seed_sequence(seed: int, episode: int, stream: Stream) -> np.random.SeedSequence:
-    """The seed of one stream in episode number `episode` after a reset with `seed`."""
+    """Return the seed of one stream in episode number `episode` after a reset with `seed`."""
     return np.random.SeedSequence(entropy=seed, spawn_key=(episode, int(stream)))
 
 
 def generator(seed: int, episode: int, stream: Stream) -> np.random.Generator:
-    """A NumPy generator for one stream."""
+    """Return a NumPy generator for one stream."""
     return np.random.default_rng(seed_sequence(seed, episode, stream))
 
 
 def splitmix_states(seed: int, episode: int, stream: Stream, robots: int) -> np.ndarray:
-    """(robots,) uint64 initial states for compiled draws, one for each robot."""
+    """Return (robots,) uint64 initial states for compiled draws, one for each robot."""
     return seed_sequence(seed, episode, stream).generate_state(robots, np.uint64)
 
 
 def check_seed(seed: object) -> int:
-    """The seed as an int; if it is None, a new one from the operating system.
+    """Return the seed as an int; if it is None, a new one from the operating system.
 
     Raises:
         SettingError: It is neither None nor a whole number ≥ 0.
@@ -61,7 +61,7 @@ def check_seed(seed: object) -> int:
 
 @lean_kernel
 def draw_uniform(state):
-    """A uniform number in [0, 1) from SplitMix64; `state`, (1,) uint64, is advanced in place."""
+    """Return a uniform number in [0, 1) from SplitMix64; `state`, (1,) uint64, is advanced in place."""
     mixed = state[0] + np.uint64(0x9E3779B97F4A7C15)
     state[0] = mixed
     mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -72,6 +72,6 @@ def draw_uniform(state):
 
 @lean_kernel
 def draw_gaussian(state):
-    """A standard normal number (Box & Muller 1958); two uniform draws from `state`."""
+    """Return a standard normal number (Box & Muller 1958); two uniform draws from `state`."""
     radius = math.sqrt(-2.0 * math.log(1.0 - draw_uniform(state)))
     return radius * math.cos(2.0 * math.pi * draw_uniform(state))

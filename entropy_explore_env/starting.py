@@ -16,7 +16,7 @@ _SCRIPTS = "entropy-explore-"
 
 
 def is_command(word: str) -> bool:
-    """Whether a process whose first word is this one is just starting a command of ours."""
+    """Return whether a process whose first word is this one is just starting a command of ours."""
     return word == "-m" or Path(word).name.startswith(_SCRIPTS)
 
 

@@ -69,7 +69,7 @@ class Need(NamedTuple):
 
 
 def memory_needs(scenario: Scenario, batch: Batch) -> list[Need]:
-    """What missions hold in memory after their first steps, adapters' spaces and observations included.
+    """Return what missions hold in memory after their first steps, adapters included.
 
     Kept out: Python's own objects, compiled code, pictures, and whatever strategies hold.
 
@@ -104,7 +104,7 @@ def memory_needs(scenario: Scenario, batch: Batch) -> list[Need]:
 
 
 def _world_bytes(scenario: Scenario, batch: Batch) -> int:
-    """Worlds with their collision masks, starts and visible voxels; and the no-fly masks of missions."""
+    """Return the size of worlds with their masks, starts and visible voxels, and of no-fly masks."""
     voxels, planar = scenario.grid.voxels, scenario.grid.shape[0] * scenario.grid.shape[1]
     layouts = 0
     for kind in set(scenario.kinds):
@@ -126,7 +126,7 @@ def _world_bytes(scenario: Scenario, batch: Batch) -> int:
 
 
 def _observation_needs(scenario: Scenario, batch: Batch) -> list[Need]:
-    """A need for each part: the missions' observations, those handed out last, and their spaces."""
+    """Return a need for each part: the missions' observations, those handed out last, and their spaces."""
     rows = batch.missions * scenario.robots
     each = 8 * rows + _SPACE_BYTES * (rows + scenario.robots) + 16
     return [
@@ -190,7 +190,7 @@ def check_memory(scenario: Scenario, batch: Batch) -> None:
 
 
 def _value_of(scenario: Scenario, batch: Batch, setting: str) -> object:
-    """The value that a setting of a Need has."""
+    """Return the value that a setting of a Need has."""
     owner, _, field = setting.rpartition(".")
     if not owner:
         return getattr(batch, field)
@@ -199,7 +199,7 @@ def _value_of(scenario: Scenario, batch: Batch, setting: str) -> object:
 
 
 def memory_there_is() -> int | None:
-    """Bytes of memory that this process may have; None where the system does not say."""
+    """Return the bytes of memory that this process may have; None where the system does not say."""
     try:
         there_is = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):

@@ -54,7 +54,7 @@ class MissionEnd(enum.Enum):
 
 
 def goals_reached(ends: np.ndarray) -> np.ndarray:
-    """Which of some missions came to what they ask for, bool, from the codes of their ends."""
+    """Return which of some missions came to what they ask for, bool, from the codes of their ends."""
     return (ends == MissionEnd.MAPPED.code) | (ends == MissionEnd.SEEN.code)
 
 

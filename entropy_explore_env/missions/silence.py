@@ -14,7 +14,7 @@ _DETOURS = 2.0
 
 
 def is_silent(params, heard, time_s):
-    """Whether a teammate that was heard counts as silent.
+    """Return whether a teammate that was heard counts as silent.
 
     Until it must be heard again it may drive, for twice the time of the straight drive to the viewpoint that
     it announced, turn half round, scan, and wait behind a teammate; its message may wait for the end of a

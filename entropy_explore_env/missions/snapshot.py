@@ -19,7 +19,7 @@ _MOST_DIGITS = 4000
 
 
 def snapshot(missions: Missions) -> dict[str, np.ndarray]:
-    """All that changes in missions, for `restore`.
+    """Return all that changes in missions, for `restore`.
 
     Returns:
         Arrays without Python objects, so that NumPy writes and reads them without pickle: `seeds` and
@@ -87,12 +87,12 @@ def restore(missions: Missions, arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def _is_seed(seed: np.str_) -> bool:
-    """Whether a text is a seed's digits, and no more than Python turns into a number."""
+    """Return whether a text is a seed's digits, and no more than Python turns into a number."""
     return str(seed).isdecimal() and len(str(seed)) <= _MOST_DIGITS
 
 
 def _options_of(missions: Missions, mission: int, arrays: Mapping[str, np.ndarray]) -> ResetOptions:
-    """What the mission's latest reset was given."""
+    """Return what the mission's latest reset was given."""
     starts, number = arrays.get(f"starts_{mission}"), arrays.get(f"world_number_{mission}")
     content = arrays.get(f"world_{mission}")
     if starts is not None:
@@ -106,7 +106,7 @@ def _options_of(missions: Missions, mission: int, arrays: Mapping[str, np.ndarra
 
 
 def _saved_world(name: str, content: np.ndarray) -> World:
-    """The world in the bytes of its file."""
+    """Return the world in the bytes of its file."""
     try:
         return world_from_bytes(content.tobytes())
     except Exception:  # of a broken archive: zipfile and NumPy raise a dozen kinds

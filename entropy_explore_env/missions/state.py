@@ -248,7 +248,7 @@ def state_arrays(scenario: Scenario, missions: int, cells: int) -> dict[str, Sta
 
 
 def new_state(scenario: Scenario, missions: int, cells: Cells) -> MissionState:
-    """Arrays for E missions of a scenario, not yet reset; beliefs are pooled to the cells."""
+    """Return arrays for E missions of a scenario, not yet reset; beliefs are pooled to the cells."""
     wanted = state_arrays(scenario, missions, len(cells.voxels))
     arrays = {name: np.zeros(each.shape, each.dtype) for name, each in wanted.items()}
     if not arrays["collision"].size:

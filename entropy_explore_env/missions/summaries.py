@@ -128,7 +128,7 @@ def note_summary(team, recipients, sender, pose, sent_s, time_s, bits):
 
 @lean_kernel
 def summary_bits(localization, length):
-    """What a summary of so many bytes costs, with its sender's pose and, where robots drift, covariance."""
+    """Return the bits of a summary, with its sender's pose and, where robots drift, covariance."""
     return BITS_PER_BATCH + _BITS_PER_BYTE * length + covariance_bits(localization)
 
 
@@ -147,7 +147,7 @@ def pack_summary(summaries, slot, index, robots, length):
 
 @lean_kernel
 def receive_summary(summaries, team, maps, in_flight, slot):
-    """A delayed summary arrives: its recipients fuse it; its slot is free again.
+    """Let a delayed summary arrive: its recipients fuse it; its slot is free again.
 
     Args:
         summaries: TeamSummaries, or None.
@@ -177,7 +177,7 @@ def receive_summary(summaries, team, maps, in_flight, slot):
 
 @lean_kernel
 def latest_precision(localization, index, voxel_size_m):
-    """The most precision that a leaf of a robot's summary has, by the covariance at its latest scan."""
+    """Return the most precision of a leaf of a robot's summary, by the covariance at its latest scan."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return math.inf
     return precision_of_place(localization.estimates[index].packed, voxel_size_m)
@@ -185,7 +185,7 @@ def latest_precision(localization, index, voxel_size_m):
 
 @lean_kernel
 def sent_precision(localization, covariances, slot, voxel_size_m):
-    """The same by the covariance beside a delayed message."""
+    """Return the same by the covariance beside a delayed message."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return math.inf
     return precision_of_place(covariances[slot], voxel_size_m)
@@ -193,7 +193,7 @@ def sent_precision(localization, covariances, slot, voxel_size_m):
 
 @lean_kernel
 def precision_of_place(packed, voxel_size_m):
-    """1/σ² of coverage that comes from how well a place is known: vsz² / tr Σ of x, y, z; inf = exactly.
+    """Return 1/σ² of coverage by how well a place is known: vsz² / tr Σ of x, y, z; inf = exactly.
 
     Args:
         packed: (10,) float64, see `robots.localization.pack_covariance`.

@@ -28,13 +28,13 @@ AVX-512, and the same pictures give files that differ."""
 
 
 def colour_codes(picture: np.ndarray) -> np.ndarray:
-    """(H, W) uint16: the upper 5 bits of red, green and blue of a picture (H, W, 3) uint8."""
+    """Return (H, W) uint16: the upper 5 bits of red, green and blue of a picture (H, W, 3) uint8."""
     red, green, blue = np.moveaxis((picture >> 3).astype(np.uint16), -1, 0)
     return red << 10 | green << 5 | blue
 
 
 def shared_palette(usage: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The 256 most used colours.
+    """Return the 256 most used colours.
 
     Args:
         usage: (32768,) int64, how often each colour code occurs.
@@ -65,7 +65,7 @@ class Film:
         self._every_s, self._due_s = 0.1, 0.0
 
     def due(self, time_s: float) -> bool:
-        """Whether a picture of this moment is wanted."""
+        """Return whether a picture of this moment is wanted."""
         return time_s >= self._due_s
 
     def add(self, time_s: float, picture: np.ndarray) -> None:
@@ -91,7 +91,7 @@ class Film:
         return [time_s for time_s, _ in self._kept]
 
     def picture_at(self, time_s: float) -> np.ndarray:
-        """The last picture (H, W, 3) uint8 up to a moment; before the first one that one."""
+        """Return the last picture (H, W, 3) uint8 up to a moment; before the first one that one."""
         until = [packed for moment_s, packed in self._kept if moment_s <= time_s]
         return self._unpacked(until[-1] if until else self._kept[0][1])
 
@@ -99,7 +99,7 @@ class Film:
         return np.frombuffer(zlib.decompress(packed), np.uint8).reshape(self._shape)
 
     def pictures(self, last: int) -> Iterator[np.ndarray]:
-        """The pictures in order, each (H, W, 3) uint8; the last one `last` times."""
+        """Yield the pictures in order, each (H, W, 3) uint8; the last one `last` times."""
         picture = np.zeros(0, np.uint8)
         for _, packed in self._kept:
             picture = self._unpacked(packed)

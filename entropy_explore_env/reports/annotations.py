@@ -79,7 +79,7 @@ def write(
 
 
 def draw_disc(draw: ImageDraw.ImageDraw, centre: tuple[float, float], radius: float, colour: Colour) -> None:
-    """A filled disc with a dark edge around it, so that it stands out on any background."""
+    """Draw a filled disc with a dark edge, so that it stands out on any background."""
     draw.ellipse(_around(centre, radius + 1), INK)
     draw.ellipse(_around(centre, radius), colour)
 
@@ -87,7 +87,7 @@ def draw_disc(draw: ImageDraw.ImageDraw, centre: tuple[float, float], radius: fl
 def draw_ring(
     draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: int, colour: Colour | None = None
 ) -> None:
-    """The mark of a chosen viewpoint: a ring with dark edges; without a colour, all of it dark."""
+    """Draw the mark of a chosen viewpoint: a ring with dark edges; without a colour, all of it dark."""
     radius = MARK_RADIUS * unit
     if colour is None:
         draw.ellipse(_around(centre, radius), outline=INK, width=2 * unit)
@@ -97,7 +97,7 @@ def draw_ring(
 
 
 def draw_cross(draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: int) -> None:
-    """The mark over a robot that has stopped: a dark cross, larger than the robot's disc."""
+    """Draw the mark over a robot that has stopped: a dark cross, larger than the robot's disc."""
     x, y = centre
     arm = (MARK_RADIUS + 3) * unit
     for side in (-1, 1):
@@ -107,7 +107,7 @@ def draw_cross(draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: int
 def draw_edged_line(
     draw: ImageDraw.ImageDraw, points: np.ndarray, width: int, colour: Colour | None = None
 ) -> None:
-    """A line with dark edges through (N, 2) points, for any background; without a colour, all of it dark."""
+    """Draw a line with dark edges through (N, 2) points; without a colour, all of it dark."""
     corners = points.ravel().tolist()
     draw.line(corners, INK, width + 2)
     if colour is not None:
@@ -117,14 +117,14 @@ def draw_edged_line(
 def draw_diamond(
     draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: int, colour: Colour | None = None
 ) -> None:
-    """The mark of where a robot truly is that does not know it: light, with an edge of its colour."""
+    """Draw the mark of where a robot that drifts truly is: light, with an edge of its colour."""
     for radius, fill in ((MARK_RADIUS * unit + 1, INK), (MARK_RADIUS * unit, colour or INK)):
         draw.polygon(_corners(centre, radius, 4), fill)
     draw.polygon(_corners(centre, (MARK_RADIUS - 2) * unit, 4), PAPER)
 
 
 def draw_triangle(draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: int) -> None:
-    """The mark of a fiducial: a light triangle with a dark edge."""
+    """Draw the mark of a fiducial: a light triangle with a dark edge."""
     draw.polygon(_corners(centre, (MARK_RADIUS + 1) * unit, 3), INK)
     draw.polygon(_corners(centre, (MARK_RADIUS - 1) * unit, 3), PAPER)
 
@@ -142,14 +142,14 @@ def _around(centre: tuple[float, float], radius: float) -> tuple[float, float, f
 
 
 def outline(draw: ImageDraw.ImageDraw, box: Box) -> None:
-    """A dark frame of one pixel around a rectangle."""
+    """Draw a dark frame of one pixel around a rectangle."""
     draw.rectangle((box.left - 1, box.top - 1, box.right, box.bottom), outline=INK)
 
 
 def draw_key(
     page: Image.Image, quantity: str, view: Box, unit: int, pixels_per_m: float | None = None
 ) -> None:
-    """The key to the colours below a map.
+    """Draw the key to the colours below a map.
 
     Args:
         page: Changed in place.
@@ -182,7 +182,7 @@ def draw_key(
 def _draw_scale_bar(
     draw: ImageDraw.ImageDraw, place: tuple[float, float], unit: int, pixels_per_m: float
 ) -> None:
-    """A bar of a round number of metres, with its length."""
+    """Draw a bar of a round number of metres, with its length."""
     x, y = place
     length_m = _round_length(40 * unit / pixels_per_m)
     end = x + length_m * pixels_per_m
@@ -196,18 +196,18 @@ def _draw_scale_bar(
 
 
 def _round_length(most: float) -> float:
-    """The longest of …, 0.5, 1, 2, 5, 10, … that is not above `most`."""
+    """Return the longest of …, 0.5, 1, 2, 5, 10, … that is not above `most`."""
     decade = 10.0 ** np.floor(np.log10(most))
     return float(max(step * decade for step in (1, 2, 5) if step * decade <= most * (1 + 1e-9)))
 
 
 def legend_rows(robots: int, marks: tuple[Mark, ...]) -> int:
-    """Lines of the legend: two robots each, and one for each mark."""
+    """Return the lines of the legend: two robots each, and one for each mark."""
     return (min(robots, len(ROBOT_COLOURS)) + 1) // 2 + len(marks)
 
 
 def draw_legend(draw: ImageDraw.ImageDraw, box: Box, robots: int, marks: tuple[Mark, ...], unit: int) -> None:
-    """The colours of the robots, two in a row, and what the marks mean."""
+    """Draw the colours of the robots, two in a row, and what the marks mean."""
     shown, inset = min(robots, len(ROBOT_COLOURS)), (MARK_RADIUS + 1) * unit
     for robot in range(shown):
         left = box.left + robot % 2 * box.width // 2
@@ -222,7 +222,7 @@ def draw_legend(draw: ImageDraw.ImageDraw, box: Box, robots: int, marks: tuple[M
 
 
 def _draw_mark(draw: ImageDraw.ImageDraw, mark: Mark, place: tuple[float, float], unit: int) -> None:
-    """A mark as the legend shows it."""
+    """Draw a mark as the legend shows it."""
     if mark is Mark.VIEWPOINT:
         draw_ring(draw, place, unit)
     elif mark is Mark.TRUE_PLACE:
@@ -235,7 +235,7 @@ def _draw_mark(draw: ImageDraw.ImageDraw, mark: Mark, place: tuple[float, float]
 
 
 def draw_axes(draw: ImageDraw.ImageDraw, box: Box, unit: int) -> None:
-    """Axes of the entropy curves: share from 0 to 100 % over time."""
+    """Draw the axes of the entropy curves: share from 0 to 100 % over time."""
     size = TEXT_SIZE * unit
     write(draw, (box.left, box.top - 4 * unit), "entropy left", size, "ls")
     for percent in (0, 50, 100):

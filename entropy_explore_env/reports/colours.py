@@ -41,7 +41,7 @@ UNKNOWN_LEVEL = 255
 
 
 def colour_ramp(anchors: tuple[Colour, ...], levels: int) -> np.ndarray:
-    """(levels, 3) uint8, colours interpolated between equally spaced anchors."""
+    """Return (levels, 3) uint8, colours interpolated between equally spaced anchors."""
     wanted, given = np.linspace(0, 1, levels), np.linspace(0, 1, len(anchors))
     channels = [np.interp(wanted, given, channel) for channel in np.array(anchors, dtype=np.float64).T]
     return np.stack(channels, axis=1).round().astype(np.uint8)
@@ -55,5 +55,5 @@ COLOURS: dict[str, np.ndarray] = {
 
 
 def robot_colour(robot: int) -> Colour:
-    """The colour of the robot with this index, in every panel."""
+    """Return the colour of the robot with this index, in every panel."""
     return ROBOT_COLOURS[robot % len(ROBOT_COLOURS)]

@@ -31,7 +31,7 @@ _STEEPEST_RAD = math.pi / 4
 
 
 def mission_figures(missions: Missions, mission: int, floor: bool | None = None) -> dict[str, Any]:
-    """The figures of a mission.
+    """Return the figures of a mission.
 
     Entropies are those of the best-informed robot's map unless stated otherwise; counts are sums over the
     team; undefined figures are None.
@@ -97,7 +97,7 @@ def mission_figures(missions: Missions, mission: int, floor: bool | None = None)
 
 
 def _ended_by(missions: Missions, mission: int) -> list[str]:
-    """Whose maps were good enough when the mission came to what it asks for; empty where it did not."""
+    """Return whose maps were good enough when the mission reached its goal; empty where it did not."""
     end, scenario, faults = missions.over(mission), missions.scenario, missions.state.faults[mission]
     if not end.reached_goal:
         return []
@@ -114,7 +114,7 @@ def _ended_by(missions: Missions, mission: int) -> list[str]:
 
 
 def localization_told(missions: Missions, mission: int) -> dict[str, float | int | None]:
-    """How wrong a mission's robots were about their poses: see `localization_figures`.
+    """Return how wrong a mission's robots were about their poses: see `localization_figures`.
 
     Where they keep landmarks of their own maps, also `own_sightings` of those that they still keep, after the
     scans that chose them.
@@ -128,13 +128,13 @@ def localization_told(missions: Missions, mission: int) -> dict[str, float | int
 
 
 def _reached(clock: np.void, place: int) -> float | None:
-    """Time at which one of the shares in PROGRESS was reached; None = it was not."""
+    """Return the time at which one of the shares in PROGRESS was reached; None = it was not."""
     time_s = float(clock["reached_s"][place])
     return None if time_s < 0.0 else time_s
 
 
 def joint_figures(missions: Missions, mission: int) -> dict[str, float | int | None]:
-    """The map that fuses all measurements of the team, compared with the truth.
+    """Return the map that fuses all measurements of the team, compared with the truth.
 
     Returns:
         `entropy_bits`; `explored`: share of the voxels that robots can observe at all that were
@@ -165,7 +165,7 @@ def joint_figures(missions: Missions, mission: int) -> dict[str, float | int | N
 
 @lru_cache(maxsize=8)
 def information_floor(scenario: Scenario, world: World) -> float:
-    """Least number of scans that can map the world: the precision that voxels need over that of one scan.
+    """Return the least number of scans that map the world: the precision needed over that of one scan.
 
     A voxel needs 1/σ_end² - 1/σ_prior² of precision; a ray adds 1/σ(d)² to each voxel that it crosses
     (Rocha04, eqs. 5 and 17). One scan is taken to add as much as the best of 256 scans from random voxels

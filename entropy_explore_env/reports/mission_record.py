@@ -141,7 +141,7 @@ class CommandRecorder:
     def record(
         self, strategy: str = "", results: Mapping[str, np.ndarray] = MappingProxyType({})
     ) -> MissionRecord:
-        """The record of the mission so far.
+        """Return the record of the mission so far.
 
         Args:
             strategy: What chose the commands.
@@ -172,7 +172,7 @@ class CommandRecorder:
         )
 
     def _table(self) -> np.ndarray:
-        """The commands as one array, short ones filled up with zeros."""
+        """Return the commands as one array, short ones filled up with zeros."""
         robots = self._missions.scenario.robots
         given = [action for actions in self._commands for action in actions]
         longest = max((action.size for action in given), default=1)
@@ -185,19 +185,19 @@ class CommandRecorder:
 
 
 def given_worlds_of(record: MissionRecord) -> dict[str, Any]:
-    """What an environment for the record takes beside the scenario: the world, where it was given to it."""
+    """Return what an environment for the record takes beside the scenario: a world that was given."""
     return {"world": record.world} if record.scenario.world == GIVEN else {}
 
 
 def reset_options_of(record: MissionRecord) -> dict[str, Any]:
-    """The options of `reset` that start the record's mission; empty where all was drawn."""
+    """Return the options of `reset` that start the record's mission; empty where all was drawn."""
     world = record.world_number if record.scenario.world == GIVEN or record.world is None else record.world
     options = {"starts": record.starts, "world": world}
     return {name: given for name, given in options.items() if given is not None}
 
 
 def same_end(record: MissionRecord, missions: Missions) -> bool:
-    """Whether the first of some missions is, bit for bit, where the record's mission ended."""
+    """Return whether the first of some missions is, bit for bit, where the record's mission ended."""
     return state_digest(missions, 0) == record.digest
 
 
@@ -300,7 +300,7 @@ def load_record(path: Path | str) -> MissionRecord:
 
 
 def _head(entries: Mapping[str, np.ndarray]) -> Head:
-    """The head of a record of this format, as it was written."""
+    """Return the head of a record of this format, as it was written."""
     if "head" not in entries and str(entries.get("format")) != FORMAT:
         raise RefusedError("a mission record, as --record writes it")
     text = entries["head"].tobytes() if "head" in entries else b'{"format": "", "version": 0}'
@@ -313,7 +313,7 @@ def _head(entries: Mapping[str, np.ndarray]) -> Head:
 
 
 def _record(head: Head, entries: Mapping[str, np.ndarray]) -> MissionRecord:
-    """The record, if its entries fit each other."""
+    """Return the record, if its entries fit each other."""
     scenario = scenario_of(head.settings)
     commands, scans = entries["commands"], len(entries["scan_s"])
     steps, longest = len(commands), commands.shape[-1]

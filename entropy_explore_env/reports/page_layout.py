@@ -55,7 +55,7 @@ class View(Box):
         return f"{self.quantity}, from {'above' if self.up == 1 else 'the side'}{heights}"
 
     def place(self, points_m: np.ndarray, origin_m: np.ndarray, size_m: np.ndarray) -> np.ndarray:
-        """Where points (N, 3) of the map frame, metres, lie in the map: (N, 2) float64 pixels, x and y.
+        """Return where points (N, 3), map frame, metres, lie in the map: (N, 2) float64 pixels, x and y.
 
         Points farther outside than the map is wide are moved to that distance.
         """

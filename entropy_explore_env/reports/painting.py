@@ -24,7 +24,7 @@ FRAMES_PER_S = 10
 
 
 def offered_modes() -> list[str]:
-    """The render modes that can be had with what is installed: a window needs the extra `render`."""
+    """Return the render modes that can be had with what is installed: a window needs the extra `render`."""
     try:
         window = importlib.util.find_spec("pygame") is not None
     except ImportError:
@@ -40,20 +40,20 @@ def check_render_mode(render_mode: str | None) -> None:
 
 
 def entropy_share(missions: Missions, mission: int, robot: int) -> np.ndarray:
-    """(X, Y, Z) float32: the share of each voxel's entropy that is left, 1 at the prior, 0 at σ_end."""
+    """Return (X, Y, Z) float32, each voxel's share of entropy that is left: 1 at the prior, 0 at σ_end."""
     known, prior = (float(missions.rules.params[name][0]) for name in ("end_precision", "prior_precision"))
     return shares_left(missions.precision[mission, robot], prior, known)
 
 
 def remaining_share(missions: Missions, mission: int) -> np.ndarray:
-    """(A,) the share that is left of the bits that the mission asks each robot's map for, from 1 to 0."""
+    """Return (A,), the share of the bits asked of each robot's map that is left, from 1 to 0."""
     clock = missions.state.missions[mission]
     start, end = clock["entropy_start_bits"], clock["entropy_end_bits"]
     return (missions.state.robots[mission]["entropy_bits"] - end) / (start - end)
 
 
 def world_name(missions: Missions, mission: int) -> str:
-    """Name of a mission's world: the scenario's, or that of the world's file or of the given World."""
+    """Return the name of a mission's world: the scenario's, that of its file, or of the given World."""
     name, world = missions.scenario.world, missions.worlds[mission]
     if name == GIVEN and world is not None:
         return world.name
@@ -92,7 +92,7 @@ class Painter:
             self._window.show(self.paint(missions))
 
     def picture(self, missions: Missions) -> np.ndarray | None:
-        """The picture of this moment, (480, 640, 3) uint8, in mode `rgb_array`; otherwise None.
+        """Return the picture of this moment, (480, 640, 3) uint8, in mode `rgb_array`; otherwise None.
 
         Without a mode a warning says how to get one.
 

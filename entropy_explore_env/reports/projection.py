@@ -66,7 +66,7 @@ def _project(share, coverage, entropy_above, cover_above, known_above, entropy_s
 
 
 def shares_left(precision: np.ndarray, prior: float, known: float) -> np.ndarray:
-    """The share of each voxel's entropy that is left, float32: 1 at the precision `prior`, 0 from `known` on.
+    """Return each voxel's share of entropy that is left, float32: 1 at precision `prior`, 0 from `known`.
 
     Args:
         precision: float32 of any shape, 1/σ² of each voxel; not changed.
@@ -80,7 +80,7 @@ def shares_left(precision: np.ndarray, prior: float, known: float) -> np.ndarray
 
 @lean_kernel
 def _fill_shares(precision, known, scale, shares):
-    """Entropy is linear in log σ: shares of it by the logarithm of the precision."""
+    """Fill in shares of entropy, which is linear in log σ, by the logarithm of the precision."""
     for voxel in range(len(precision)):
         left = np.log2(precision[voxel] / known) * scale
         shares[voxel] = min(max(left, 0.0), 1.0)

@@ -16,14 +16,14 @@ _FAILED = MoveEnd.FAILED.code
 
 
 def poses_now(missions: Missions, mission: int) -> np.ndarray:
-    """(A, 5) float64 current poses of a mission's robots, driving or not: x, y, z, yaw, pitch."""
+    """Return (A, 5) float64 current poses of a mission's robots, driving or not: x, y, z, yaw, pitch."""
     time_s = float(missions.state.missions[mission]["time_s"])
     numbers, robots = missions.rules.params, missions.state.robots[mission]
     return np.stack([np.array(pose_at(numbers[a], robot, time_s)) for a, robot in enumerate(robots)])
 
 
 def believed_poses_now(missions: Missions, mission: int) -> np.ndarray:
-    """(A, 5) float64 where a mission's robots believe to be: `poses_now` where nobody drifts."""
+    """Return (A, 5) float64 where a mission's robots believe to be: `poses_now` where nobody drifts."""
     poses = poses_now(missions, mission)
     if missions.estimates is None:
         return poses
@@ -119,7 +119,7 @@ class Recorder:
         self._paths.update(self.missions)
 
     def sampled_moments(self, most: int) -> np.ndarray:
-        """(≤ most,) int64 numbers of evenly spaced moments, the first and the last among them."""
+        """Return (≤ most,) int64 numbers of evenly spaced moments, the first and the last among them."""
         return np.unique(np.linspace(0, len(self._moments) - 1, most).round().astype(np.int64))
 
     @property

@@ -163,14 +163,14 @@ def draw_frame(frame: Frame, width: int = 640, height: int = 480) -> np.ndarray:
 
 
 def _write_title(draw: ImageDraw.ImageDraw, title: str, width: int, unit: int) -> None:
-    """The title in large letters, or in small ones where it is long."""
+    """Write the title in large letters, or in small ones where it is long."""
     fits = text_width(printable(title), _TITLE_SIZE * unit) <= width
     size = (_TITLE_SIZE if fits else TEXT_SIZE) * unit
     write(draw, (MARGIN * unit, HEADER / 2 * unit), shortened(title, width, size), size, "lm")
 
 
 def _map_picture(view: View, projected: Projection) -> Image.Image:
-    """A map without robots."""
+    """Return a map without robots."""
     if view.quantity == "entropy":
         levels = np.clip(_pooled(projected.entropy, view, np.add), 0.0, 1.0) * 255.0
     else:
@@ -233,7 +233,7 @@ def _draw_robots(picture: Image.Image, view: View, frame: Frame, unit: int) -> N
 
 
 def estimate_outline(centre_m: np.ndarray, covariance_m2: np.ndarray, up: int) -> np.ndarray:
-    """(N, 3) closed outline of two standard deviations around a place, in the plane of x and axis `up`."""
+    """Return the closed outline (N, 3) of two standard deviations around a place, in x and axis `up`."""
     axes = [0, up]
     variances, directions = np.linalg.eigh(np.asarray(covariance_m2)[np.ix_(axes, axes)])
     angles = np.linspace(0.0, 2.0 * np.pi, _ELLIPSE_POINTS)
@@ -244,7 +244,7 @@ def estimate_outline(centre_m: np.ndarray, covariance_m2: np.ndarray, up: int) -
 
 
 def _draw_curves(draw: ImageDraw.ImageDraw, box: Box, frame: Frame, unit: int) -> None:
-    """One entropy curve for each robot, from time 0 to the last time."""
+    """Draw one entropy curve for each robot, from time 0 to the last time."""
     if len(frame.curve_s) == 0:
         return
     few = np.unique(np.linspace(0, len(frame.curve_s) - 1, 4 * box.width).astype(np.int64))

@@ -128,7 +128,7 @@ class RerunView:
             self._due_s = time_s + _VOXELS_EVERY_S
 
     def _log_static(self) -> None:
-        """What does not change: axes, the workspace's edges, bodies and colours."""
+        """Log what does not change: axes, the workspace's edges, bodies and colours."""
         rr, missions = self._rr, self._missions
         grid, robots = missions.grid, missions.scenario.robots
         half = 0.5 * grid.size_m
@@ -202,7 +202,7 @@ class _Cells:
     def changed(
         self, missions: Missions, least: float
     ) -> list[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
-        """The blocks to write: name, cells (N, 3), levels of entropy (N,) and whether covered (N,)."""
+        """Return the blocks to write: name, cells (N, 3), levels of entropy (N,) and whether covered (N,)."""
         levels, covered = self._seen(missions)
         differs = (levels != self._levels) | (covered != self._covered)
         blocks = []
@@ -233,7 +233,7 @@ class _Cells:
 
 
 def _block_sums(cells: np.ndarray) -> np.ndarray:
-    """How many cells of each block are True."""
+    """Return how many cells of each block are True."""
     counts = cells.astype(np.int32)
     for axis, edge in enumerate(cells.shape):
         counts = np.add.reduceat(counts, np.arange(0, edge, _BLOCK), axis=axis)
@@ -250,7 +250,7 @@ def cone_edges(sensor: RangeSensor, yaw: float, pitch: float) -> list[np.ndarray
 
 
 def shared_ends_m(missions: Missions, robot: int) -> np.ndarray:
-    """(N, 3) float64 end points of the measurements of a robot's latest scan that it sent, best first."""
+    """Return the end points (N, 3) float64 of what a robot sent of its latest scan, best first."""
     scenario, state = missions.scenario, missions.state
     own, sensor = state.robots[0, robot], scenario.kind_of(robot).sensor
     model = sensor_model(sensor)
@@ -266,7 +266,7 @@ def shared_ends_m(missions: Missions, robot: int) -> np.ndarray:
 
 
 def _gazes(yaw: Any, pitch: Any) -> tuple[np.ndarray, ...]:  # noqa: ANN401 - numbers or arrays
-    """Unit vectors along gazes; pitch downwards (REP-103)."""
+    """Return unit vectors along gazes; pitch downwards (REP-103)."""
     return np.broadcast_arrays(np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), -np.sin(pitch))
 
 
@@ -278,7 +278,7 @@ def _quaternion(yaw: float, pitch: float) -> tuple[float, float, float, float]:
 
 
 def _blueprint() -> Any:  # noqa: ANN401 - Rerun's
-    """How the viewer opens: entropy beside coverage, the curves below."""
+    """Return how the viewer opens: entropy beside coverage, the curves below."""
     import rerun.blueprint as rrb
 
     views = [

@@ -69,7 +69,7 @@ class Air(NamedTuple):
 
 @lean_kernel
 def edges_in_walls(air, size, start, finish):
-    """How much of the straight line between two points is in solid voxels, in grid units.
+    """Return how much of the straight line between two points is in solid voxels, in grid units.
 
     The same from either end. Where the line only touches a voxel it is not in it.
 
@@ -97,7 +97,7 @@ def edges_in_walls(air, size, start, finish):
 
 @lean_kernel
 def path_loss_db(apart_m, exponent, wall_loss_db_per_m, walls_m):
-    """What the way beyond the first metre costs: see `settings.channel.Signal`.
+    """Return what the way beyond the first metre costs: see `settings.channel.Signal`.
 
     Args:
         apart_m: Distance between sender and teammate.
@@ -140,7 +140,7 @@ def select_measurements(utility, burst, i_min_bits, order):
 
 @lean_kernel
 def steered_i_min(i_min_bits, utility, burst, fill):
-    """I_min after a scan, so that a share of the burst is filled with what is most useful over time.
+    """Return I_min after a scan, so that a share of the burst is filled with what is most useful over time.
 
         ln I_min ← ln I_min + 0.1 · (min(m / (fill · burst), 2) - 1)
 
@@ -164,7 +164,7 @@ def steered_i_min(i_min_bits, utility, burst, fill):
 
 @lean_kernel
 def draw_delivery(apart_m, range_m, loss_probability, rng):
-    """Whether a message reaches a teammate: the code of a Delivery.
+    """Return whether a message reaches a teammate: the code of a Delivery.
 
     Args:
         apart_m: Distance between the two when it is sent.

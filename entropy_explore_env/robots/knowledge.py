@@ -138,5 +138,5 @@ class RobotKnowledge:
 
 
 def place_text(pose: np.ndarray) -> str:
-    """The first three numbers of a pose or viewpoint, metres."""
+    """Return the first three numbers of a pose or viewpoint, metres."""
     return "(" + ", ".join(f"{number:.3g}" for number in pose[:3]) + ") m"

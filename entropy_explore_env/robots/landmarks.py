@@ -79,7 +79,7 @@ def added_since(landmark, here, covariance, matrices):
 
 @lean_kernel
 def is_covariance(matrix, scale, factors):
-    """Whether a symmetric (4, 4) has no negative eigenvalue, but for rounding: by its Cholesky factors.
+    """Return whether a symmetric (4, 4) has no negative eigenvalue, up to rounding: by Cholesky factors.
 
     Args:
         matrix: (4, 4) float64.

@@ -92,7 +92,7 @@ COVARIANCE_NUMBERS = 10
 
 @lean_kernel
 def believed_point(estimate, position):
-    """(x, y, z) at which a robot believes a point of the world to be, from where it believes to be itself.
+    """Return (x, y, z) at which a robot believes a point of the world to be, from where it believes to be.
 
     Args:
         estimate: ESTIMATE; None = exact.
@@ -111,7 +111,7 @@ def believed_point(estimate, position):
 
 @lean_kernel
 def point_in_world(estimate, position):
-    """(x, y, z) in the world of a point that a robot means: what `believed_point` turns back into it."""
+    """Return (x, y, z) in the world of a point that a robot means: `believed_point` turns it back."""
     if estimate is None:  # known while compiling: nothing of the rest is compiled
         return position[0], position[1], position[2]
     along, across = math.cos(estimate.error[3]) - 1.0, math.sin(estimate.error[3])
@@ -126,7 +126,7 @@ def point_in_world(estimate, position):
 
 @lean_kernel
 def believed_yaw(estimate, yaw):
-    """The yaw that a robot believes to have, or to look at."""
+    """Return the yaw that a robot believes to have, or to look at."""
     if estimate is None:  # known while compiling: nothing of the rest is compiled
         return yaw
     return yaw + estimate.error[3]
@@ -179,7 +179,7 @@ def add_drift(error, covariance, number, variance, rng):
 
 @lean_kernel
 def sighting_error(relative, range_sigma_m, bearing_sigma_rad, rng):
-    """(x, y, z), a drawn error of a sighting: along the line of sight, and sideways and up with the distance.
+    """Return (x, y, z), a drawn error of a sighting: along the sight; sideways and up with the distance.
 
     Args:
         relative: (x, y, z), from the robot to the landmark.

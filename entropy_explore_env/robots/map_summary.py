@@ -56,7 +56,7 @@ PARCEL = ranged_type(
 
 
 def _checksum_steps() -> np.ndarray:
-    """(256,) uint32: what a byte does to a CRC-32 (ISO 3309)."""
+    """Return (256,) uint32: what a byte does to a CRC-32 (ISO 3309)."""
     steps = np.arange(256, dtype=np.uint32)
     for _ in range(8):
         steps = np.where(steps & 1, steps >> 1 ^ np.uint32(0xEDB88320), steps >> 1).astype(np.uint32)
@@ -90,7 +90,7 @@ def new_summary_tree(voxels: int) -> Tree:
 
 
 def encode_map(mean: np.ndarray, precision: np.ndarray, threshold_bits: float) -> bytes:
-    """The summary of a map.
+    """Return the summary of a map.
 
     Args:
         mean: (X, Y, Z) float32, mean coverage in [0, 1].
@@ -120,7 +120,7 @@ def encode_map(mean: np.ndarray, precision: np.ndarray, threshold_bits: float) -
 
 
 def decode_map(data: bytes, shape: tuple[int, int, int]) -> MapSummary:
-    """What a summary says.
+    """Return what a summary says.
 
     Args:
         data: From `encode_map`.
@@ -136,7 +136,7 @@ def decode_map(data: bytes, shape: tuple[int, int, int]) -> MapSummary:
 
 
 def tree_bits(data: bytes, shape: tuple[int, int, int]) -> int:
-    """Bits of a summary's tree before it is packed: two a node, sixteen a leaf.
+    """Return the bits of a summary's tree before it is packed: two a node, sixteen a leaf.
 
     Args:
         data: From `encode_map`.
@@ -153,7 +153,7 @@ def tree_bits(data: bytes, shape: tuple[int, int, int]) -> int:
 
 
 def is_summary(data: object, shape: tuple[int, int, int]) -> bool:
-    """Whether something is the whole summary of a map (X, Y, Z)."""
+    """Return whether something is the whole summary of a map (X, Y, Z)."""
     if not isinstance(data, bytes) or not _FIRST <= len(data) <= summary_bytes(math.prod(shape)):
         return False
     x, y, z = shape
@@ -163,12 +163,12 @@ def is_summary(data: object, shape: tuple[int, int, int]) -> bool:
 
 
 def _bytes_of(data: bytes) -> np.ndarray:
-    """(M,) uint8, of the kind for which kernels are compiled."""
+    """Return (M,) uint8, of the kind for which kernels are compiled."""
     return np.frombuffer(data, np.uint8).copy()
 
 
 def _opened(data: bytes, shape: tuple[int, int, int]) -> Tree:
-    """The tree of a summary, of which nothing is read yet."""
+    """Return the tree of a summary, of which nothing is read yet."""
     if not is_summary(data, shape):
         found = f"{len(data)} bytes" if isinstance(data, bytes) else type(data).__name__
         allowed = f"the whole summary of a map of {shape[0]} × {shape[1]} × {shape[2]} voxels"

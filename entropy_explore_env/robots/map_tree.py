@@ -167,21 +167,21 @@ def push_parts(region, stack, depth, known):
 
 @inlined_kernel
 def top(stack, depth):
-    """The Region at a depth of the stack."""
+    """Return the Region at a depth of the stack."""
     at = stack[depth]
     return Region((at[0], at[1], at[2]), (at[3], at[4], at[5]))
 
 
 @inlined_kernel
 def voxels_of(region):
-    """How many voxels a region has."""
+    """Return how many voxels a region has."""
     low, high = region.low, region.high
     return (high[0] - low[0]) * (high[1] - low[1]) * (high[2] - low[2])
 
 
 @inlined_kernel
 def size_context(walk, voxels):
-    """Number of a context among _SIZES, by the size of a region and the kind of the node before it."""
+    """Return the number of a context among _SIZES, by a region's size and the kind of the node before."""
     bits = 0
     while voxels > 0:
         voxels >>= 1
@@ -191,7 +191,7 @@ def size_context(walk, voxels):
 
 @inlined_kernel
 def mean_context(walk):
-    """Context of the question whether a leaf's mean is that of the leaf before it."""
+    """Return the context of the question whether a leaf's mean is that of the leaf before it."""
     extreme = 1 if walk.mean == 0 else (2 if walk.mean == _MEANS else 0)
     return _ASKS_MEAN + 2 * extreme + walk.same_mean
 
@@ -241,7 +241,7 @@ def fill_levels(walk, mean, precision, levels):
 
 @lean_kernel
 def kind_of(tree, region, known, threshold_bits):
-    """Whether a region is empty, a leaf, or cut: by what was measured, and by eqs. 1-2.
+    """Return whether a region is empty, a leaf, or cut: by what was measured, and by eqs. 1-2.
 
     `known` says that all of it was measured.
     """
@@ -283,7 +283,7 @@ def kind_of(tree, region, known, threshold_bits):
 
 @lean_kernel
 def information_bits(tree, region, voxels):
-    """-Σ q log2 q over the histogram of a region's coverages in equal intervals (Sujan, eqs. 1-2)."""
+    """Return -Σ q log2 q over the histogram of a region's coverages in equal intervals (Sujan, eqs. 1-2)."""
     low, high, size, counts = region.low, region.high, tree.walk[0].size, tree.counts
     for i in range(low[0], high[0]):
         for j in range(low[1], high[1]):
@@ -301,7 +301,7 @@ def information_bits(tree, region, voxels):
 
 @inlined_kernel
 def sigma_code(variance):
-    """The least code whose σ is not below that of a variance."""
+    """Return the least code whose σ is not below that of a variance."""
     return max(math.ceil(0.5 * _STEPS * math.log2(variance / (_FINEST * _FINEST))), 0)
 
 

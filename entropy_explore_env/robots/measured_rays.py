@@ -36,7 +36,7 @@ def weigh_measurement(scan, index, params, size, start, entered):
 
 @lean_kernel
 def trace_measurement(scan, index, params, size, voxel_size_m, start, coverage):
-    """Voxels and measured coverage of a measurement with a known distance.
+    """Fill in voxels and measured coverage of a measurement with a known distance.
 
     Args:
         scan: Holds direction, length and Return of the ray; the rest is filled in.
@@ -63,7 +63,7 @@ def trace_measurement(scan, index, params, size, voxel_size_m, start, coverage):
 
 @lean_kernel
 def trace_measurements(scan, params, size, voxel_size_m, start):
-    """What `trace_measurement` fills in, for all rays of a scan that measured something, two at a time."""
+    """Fill in what `trace_measurement` does for all rays that measured something, two at a time."""
     rays, waiting = scan.rays, -1
     for index in range(len(rays)):
         if rays[index].returned == _NOTHING:
@@ -79,7 +79,7 @@ def trace_measurements(scan, params, size, voxel_size_m, start):
 
 @inlined_kernel
 def _trace_pair(scan, index, other_index, params, size, voxel_size_m, start):
-    """What `trace_measurement` fills in, for two rays."""
+    """Fill in what `trace_measurement` does, for two rays."""
     ray, other = scan.rays[index], scan.rays[other_index]
     ray.range_m, other.range_m = ray.length * voxel_size_m, other.length * voxel_size_m
     ray.voxels, other.voxels = trace_two(

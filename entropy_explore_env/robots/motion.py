@@ -68,7 +68,7 @@ _HALVINGS = 60
 
 @lean_kernel
 def driving_time(length_m, max_speed_m_s, acceleration_m_s2):
-    """Seconds from rest to rest: 2√(L/a) below L = v²/a, else L/v + v/a."""
+    """Return the seconds from rest to rest: 2√(L/a) below L = v²/a, else L/v + v/a."""
     if length_m < max_speed_m_s * max_speed_m_s / acceleration_m_s2:
         return 2.0 * math.sqrt(length_m / acceleration_m_s2)
     return length_m / max_speed_m_s + max_speed_m_s / acceleration_m_s2
@@ -99,7 +99,7 @@ def _run_up_m(profile):
 
 @inlined_kernel
 def _from_rest_to_rest(profile):
-    """(length, duration, time of speeding up) of the drive from rest to rest of which this one is a part."""
+    """Return (length, duration, time of speeding up) of the drive from rest to rest that holds this one."""
     length_m = max(profile.length_m + _run_up_m(profile), 0.0)
     duration = driving_time(length_m, profile.max_speed_m_s, profile.acceleration_m_s2)
     return length_m, duration, min(profile.max_speed_m_s / profile.acceleration_m_s2, duration / 2.0)
@@ -107,14 +107,14 @@ def _from_rest_to_rest(profile):
 
 @lean_kernel
 def duration_of(profile):
-    """Seconds that a drive takes."""
+    """Return the seconds that a drive takes."""
     _, duration, _ = _from_rest_to_rest(profile)
     return duration - profile.lead_s
 
 
 @lean_kernel
 def driven_share(elapsed_s, profile):
-    """Share in [0, 1] of a drive that is behind the robot `elapsed_s` after its start."""
+    """Return the share in [0, 1] of a drive that is behind the robot `elapsed_s` after its start."""
     length_m, duration, ramp = _from_rest_to_rest(profile)
     acceleration_m_s2 = profile.acceleration_m_s2
     since_rest_s = elapsed_s + profile.lead_s
@@ -144,7 +144,7 @@ def speed_after(elapsed_s, profile):
 
 @lean_kernel
 def time_after(driven_m, profile):
-    """Seconds from the start of a drive until `driven_m` of its length are driven: see `driven_share`."""
+    """Return the seconds from the start until `driven_m` of a drive are driven: see `driven_share`."""
     length_m, duration, ramp = _from_rest_to_rest(profile)
     acceleration_m_s2 = profile.acceleration_m_s2
     ramp_m = 0.5 * acceleration_m_s2 * ramp * ramp
@@ -161,7 +161,7 @@ def time_after(driven_m, profile):
 
 @lean_kernel
 def turning_time(yaw, pitch, new_yaw, new_pitch, turn_rate_rad_s):
-    """Seconds to turn the gaze, yaw and pitch at once, each the short way round."""
+    """Return the seconds to turn the gaze, yaw and pitch at once, each the short way round."""
     turn = abs(new_yaw - yaw) % (2.0 * math.pi)
     turn = min(turn, 2.0 * math.pi - turn)
     return max(turn, abs(new_pitch - pitch)) / turn_rate_rad_s
@@ -169,7 +169,7 @@ def turning_time(yaw, pitch, new_yaw, new_pitch, turn_rate_rad_s):
 
 @lean_kernel
 def line_believed_blocked(mean, size, footprint, radius, start, finish, crossing):
-    """Whether a body that drives on a line would touch something that is believed covered.
+    """Return whether a body that drives on a line would touch something that is believed covered.
 
     The voxel that it is in does not count, nor do voxels that its body touches there keep it from leaving:
     voxels that the body reaches into already count as free if they are not covered themselves.
@@ -210,7 +210,7 @@ def line_believed_blocked(mean, size, footprint, radius, start, finish, crossing
 
 @lean_kernel
 def free_distance(collision, size, line, finish, crossing):
-    """How far a body can drive on a line before something solid.
+    """Return how far a body can drive on a line before something solid.
 
     Args:
         collision: (V,) float32, a Collision each: above ½ the body does not fit.
@@ -250,7 +250,7 @@ def free_distance(collision, size, line, finish, crossing):
 
 @lean_kernel
 def _gap(start, direction, distance, begin, finish):
-    """Distance between the point `distance` along a line and the segment from `begin` to `finish`."""
+    """Return the distance between the point `distance` along a line and the segment `begin` to `finish`."""
     along, length = 0.0, 0.0
     for axis in range(3):
         edge = finish[axis] - begin[axis]
@@ -266,7 +266,7 @@ def _gap(start, direction, distance, begin, finish):
 
 @lean_kernel
 def distance_to_teammate(start, direction, distance, begin, finish, touching):
-    """How far a body can drive before it touches a teammate or the tube that it still sweeps.
+    """Return how far a body can drive before it touches a teammate or the tube that it still sweeps.
 
     Bodies that touch already may only part.
 

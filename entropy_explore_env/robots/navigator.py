@@ -56,7 +56,7 @@ class Navigator(NamedTuple):
 
 
 def lattice_of(scenario: Scenario, robot: Robot) -> Lattice:
-    """Steps of a kind of robot between voxel centres."""
+    """Return the steps of a kind of robot between voxel centres."""
     radius = robot.planning_radius_m / scenario.grid.voxel_size_m
     return new_lattice(scenario.grid.shape, radius, scenario.layer_of(robot))
 
@@ -80,7 +80,7 @@ def new_navigators(scenario: Scenario) -> dict[int, Navigator]:
 
 
 def footprints(navigators: Mapping[int, Navigator], kinds: int) -> np.ndarray:
-    """(K, B, 3) int64 index offsets of each kind's footprint, padded with zeros; B = 0 if no kind plans."""
+    """Return (K, B, 3) int64 offsets of each kind's footprint, padded with zeros; B = 0 if no kind plans."""
     each = {kind: navigator.lattice.footprint for kind, navigator in navigators.items()}
     padded = np.zeros((kinds, max((len(footprint) for footprint in each.values()), default=0), 3), np.int64)
     for kind, footprint in each.items():
@@ -108,18 +108,18 @@ def new_navigator(scenario: Scenario, robot: Robot) -> Navigator:
 
 
 def breaks_out_of(robot: Robot) -> bool:
-    """Whether a kind of robot plans for a body wider than its own."""
+    """Return whether a kind of robot plans for a body wider than its own."""
     return robot.planning_radius_m > robot.body_radius_m
 
 
 def navigator_bytes(scenario: Scenario) -> int:
-    """Bytes of the memory of plans that a thread's navigators share, once plans have reached all voxels."""
+    """Return the bytes of plans that a thread's navigators share, once plans have reached all voxels."""
     return search_bytes(scenario.grid.voxels) + 4 * scenario.grid.voxels
 
 
 @lean_kernel
 def _voxel_at(lattice, position):
-    """Number of the voxel that holds a position, or that is nearest to it; planar: in the layer."""
+    """Return the number of the voxel that holds a position, or is nearest to it; planar: in the layer."""
     voxel = 0
     for axis in range(3):
         index = min(max(math.floor(position[axis]), 0), lattice.size[axis] - 1)
@@ -131,7 +131,7 @@ def _voxel_at(lattice, position):
 
 @lean_kernel
 def _nearest(search, lattice, costs, goal, start, choice):
-    """The voxel nearest to a goal of those that the latest search reached, or of all passable ones.
+    """Return the voxel nearest to a goal of those that the latest search reached, or of all passable ones.
 
     Looked for in growing shells around the goal; of equals the first. The start is one, whatever it is.
     """

@@ -20,7 +20,7 @@ _LEVEL = 1e-9
 
 @inlined_kernel
 def within_half_turn(angle):
-    """An angle in [-π, π]: itself, if it is, or what is left of it without whole turns."""
+    """Return an angle in [-π, π]: itself, if it is, or what is left of it without whole turns."""
     if abs(angle) <= math.pi:
         return angle
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
@@ -28,7 +28,7 @@ def within_half_turn(angle):
 
 @lean_kernel
 def spread_yaw_error(covariance, to_x, to_y):
-    """F Σ Fᵀ, in place, with F the identity but for ∂x/∂yaw = `to_x` and ∂y/∂yaw = `to_y`."""
+    """Make F Σ Fᵀ of Σ, in place; F is the identity but for ∂x/∂yaw = `to_x` and ∂y/∂yaw = `to_y`."""
     for column in range(4):
         by_yaw = covariance[3, column]
         covariance[0, column] += to_x * by_yaw
@@ -44,7 +44,7 @@ def spread_yaw_error(covariance, to_x, to_y):
 
 @inlined_kernel
 def drift_variances(params, metres, turned):
-    """(of x and of y, of z, of the yaw): the variances that a piece of a drive adds.
+    """Return (of x and of y, of z, of the yaw): the variances that a piece of a drive adds.
 
     Args:
         params: LOCALIZATION_PARAMS.
@@ -60,13 +60,13 @@ def drift_variances(params, metres, turned):
 
 @inlined_kernel
 def turn_between(yaw, other):
-    """Radians of the shortest turn from one yaw to another, ≥ 0."""
+    """Return the radians of the shortest turn from one yaw to another, ≥ 0."""
     return abs((other - yaw + math.pi) % (2.0 * math.pi) - math.pi)
 
 
 @lean_kernel
 def in_field_of_view(params, yaw, pitch, away):
-    """Whether a landmark is in the field of view of a gaze.
+    """Return whether a landmark is in the field of view of a gaze.
 
     Args:
         params: LOCALIZATION_PARAMS of the robot.
@@ -85,7 +85,7 @@ def in_field_of_view(params, yaw, pitch, away):
 
 @lean_kernel
 def within_half_view(params, turn, tilt):
-    """Whether a direction so many radians beside and below the gaze is in the field of view.
+    """Return whether a direction so many radians beside and below the gaze is in the field of view.
 
     Args:
         params: LOCALIZATION_PARAMS of the robot.
@@ -98,13 +98,13 @@ def within_half_view(params, turn, tilt):
 
 @inlined_kernel
 def length(vector):
-    """Of (x, y, z)."""
+    """Return the length of (x, y, z)."""
     return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
 
 
 @inlined_kernel
 def sight_axes(relative):
-    """(ahead, sideways, up, distance): unit vectors at right angles, the first along a line of sight."""
+    """Return (ahead, sideways, up, distance): unit vectors at right angles, the first along the sight."""
     x, y, z = relative
     distance = max(length(relative), _NO_DISTANCE_M)
     ahead = x / distance, y / distance, z / distance
@@ -143,7 +143,7 @@ def correct_along(covariance, axis, expected, off, variance, taken):
 
 @inlined_kernel
 def gain_along(prior, axis, expected, off, variance, taken):
-    """(gains, spread, taken): what a sighting says along one axis, by a Kalman filter.
+    """Return (gains, spread, taken): what a sighting says along one axis, by a Kalman filter.
 
     Args:
         prior: (4, 4) float64, covariance of the errors of which the sighting tells.
@@ -217,7 +217,7 @@ def keep_positive(covariance):
 
 @lean_kernel
 def left_by_those_before(covariance, row, column):
-    """What the errors before a column leave of a variance, ≥ 0; their factors are below the diagonal."""
+    """Return what errors before a column leave of a variance, ≥ 0; their factors lie below the diagonal."""
     left = covariance[row, row]
     for before in range(column):
         left -= covariance[row, before] * covariance[row, before]
@@ -226,7 +226,7 @@ def left_by_those_before(covariance, row, column):
 
 @inlined_kernel
 def dot4(a, b):
-    """The sum of the products of four numbers each."""
+    """Return the sum of the products of four numbers each."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3]
 
 

@@ -68,7 +68,7 @@ def forget(odds):
 
 @inlined_kernel
 def odds_of_zero(coder, record, context):
-    """Twelve bits, never 0: how likely a context's next decision is 0."""
+    """Return twelve bits, never 0: how likely a context's next decision is 0."""
     if record.flat:
         return np.uint64(1 << 11)
     return np.uint64(coder.odds[context] >> np.uint32(8))
@@ -157,7 +157,7 @@ def begin_reading(coder, first, last, flat):
 
 @inlined_kernel
 def get(record, data):
-    """The next byte; 0 behind the end."""
+    """Return the next byte; 0 behind the end."""
     byte = np.uint64(data[record.place]) if record.place < record.last else np.uint64(0)
     record.place += 1
     return byte
@@ -165,7 +165,7 @@ def get(record, data):
 
 @inlined_kernel
 def read_bit(coder, context):
-    """The next decision, 0 or 1, which is of this context."""
+    """Return the next decision, 0 or 1, which is of this context."""
     record = coder.record[0]
     bound = (record.range >> _12) * odds_of_zero(coder, record, context)
     if record.low < bound:
@@ -194,7 +194,7 @@ def write_byte(coder, contexts, byte):
 
 @lean_kernel
 def read_byte(coder, contexts):
-    """The next number below 256: see `write_byte`."""
+    """Return the next number below 256: see `write_byte`."""
     node = 1
     for _ in range(8):
         node = node << 1 | read_bit(coder, contexts + node)
@@ -223,7 +223,7 @@ def write_change(coder, contexts, change):
 
 @lean_kernel
 def read_change(coder, contexts):
-    """The next whole number: see `write_change`."""
+    """Return the next whole number: see `write_change`."""
     negative, bits = read_bit(coder, contexts), 0
     while bits < 7 and read_bit(coder, contexts + 1 + bits) == 1:
         bits += 1

@@ -99,7 +99,7 @@ class Scene(NamedTuple):
 
 
 def true_coverage(occupied: np.ndarray, unreadable: np.ndarray | None) -> np.ndarray:
-    """What rays are cast through.
+    """Return what rays are cast through.
 
     Args:
         occupied: (X, Y, Z) bool, which voxels are solid.
@@ -115,7 +115,7 @@ def true_coverage(occupied: np.ndarray, unreadable: np.ndarray | None) -> np.nda
 
 
 def sensor_model(sensor: RangeSensor) -> SensorModel:
-    """What compiled code needs of the sensor's settings."""
+    """Return what compiled code needs of the sensor's settings."""
     params = np.zeros(1, SENSOR_PARAMS)
     params["max_range_m"], params["noise_m"] = sensor.max_range_m, sensor.range_noise_m
     params["min_range_m"] = sensor.min_range_m
@@ -127,7 +127,7 @@ def sensor_model(sensor: RangeSensor) -> SensorModel:
 
 
 def team_sensors(sensors: Sequence[RangeSensor]) -> TeamSensors:
-    """What compiled code needs of the sensors of a team, robot by robot."""
+    """Return what compiled code needs of the sensors of a team, robot by robot."""
     models = [sensor_model(sensor) for sensor in sensors]
     columns, rows = (max(len(model[axis]) for model in models) for axis in (0, 1))
     yaws, pitches = np.zeros((len(models), columns)), np.zeros((len(models), rows))
@@ -139,7 +139,7 @@ def team_sensors(sensors: Sequence[RangeSensor]) -> TeamSensors:
 
 @inlined_kernel
 def sensor_of(sensors, robot):
-    """The SensorModel of one robot of a team."""
+    """Return the SensorModel of one robot of a team."""
     params = sensors.params[robot]
     return SensorModel(
         sensors.yaw_offsets[robot, : params.columns],
@@ -150,7 +150,7 @@ def sensor_of(sensors, robot):
 
 @inlined_kernel
 def first_rays(scan, count):
-    """The working space of a scan of so many rays."""
+    """Return the working space of a scan of so many rays."""
     return Scan(
         scan.rays[:count],
         scan.utility[:count],
@@ -180,7 +180,7 @@ def new_scan(grid: Grid, sensors: Sequence[RangeSensor], rays: int) -> Scan:
 
 
 def scan_bytes(grid: Grid, sensors: Sequence[RangeSensor], rays: int) -> int:
-    """Bytes of the arrays of `new_scan`."""
+    """Return the bytes of the arrays of `new_scan`."""
     longest = max(
         longest_crossing(*grid.shape, sensor.max_range_m / grid.voxel_size_m, sensor.voxels_behind)
         for sensor in sensors
@@ -209,7 +209,7 @@ def point_rays(model, yaw, pitch, rays):
 
 @lean_kernel
 def in_view(model, pose, body):
-    """Whether a body may be hit by a ray of the bundle around a gaze.
+    """Return whether a body may be hit by a ray of the bundle around a gaze.
 
     Conservative: may be True for bodies outside the view. A ray's angle from the gaze is at most the bundle's
     half diagonal in yaw and pitch.
@@ -232,7 +232,7 @@ def in_view(model, pose, body):
 
 @inlined_kernel
 def body_distance(start, direction, bodies):
-    """Distance in grid units to the first of the balls (B, 4) on a ray (see Scene); inf if none."""
+    """Return grid units to the first of the balls (B, 4) on a ray (see Scene); inf if there is none."""
     nearest = math.inf
     for body in range(len(bodies)):
         along, apart = 0.0, 0.0
@@ -285,7 +285,7 @@ def take_scan(scan, model, scene, pose, rng):
 
 @lean_kernel
 def measure_ranges(scan, model, scene, pose, rng):
-    """What the sensor measures, as `take_scan`, without the voxels on its rays.
+    """Measure as `take_scan` does, without the voxels on the rays.
 
     For a robot that believes to be somewhere else: to it these voxels mean nothing.
     """
@@ -311,7 +311,7 @@ def measure_ranges(scan, model, scene, pose, rng):
 
 @inlined_kernel
 def measure_ray(ray, params, scene, start, end, no_return, rng):
-    """What comes back along a ray that was cast through the true world, and from how far away.
+    """Return what comes back along a ray that was cast through the true world, and from how far away.
 
     Args:
         ray: RAY; length, distance and Return are filled in.
@@ -345,7 +345,7 @@ def measure_ray(ray, params, scene, start, end, no_return, rng):
 
 @inlined_kernel
 def ends_unreadable(occupied, crossed, n, behind):
-    """Whether the covered voxel that a ray ended at gives no return.
+    """Return whether the covered voxel that a ray ended at gives no return.
 
     It is the first covered one of the last `behind` of the `n` voxels noted, which are all behind the end.
     """

@@ -18,7 +18,7 @@ _SHORT = ("max_cycles", "time_limit_s")
 
 
 def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
-    """A copy of the scenario with some settings changed.
+    """Return a copy of the scenario with some settings changed.
 
     Args:
         scenario: What to start from.
@@ -53,7 +53,7 @@ def _meant(settings: object, name: str, known: Sequence[str]) -> str:
 
 
 def _named(settings: object, changes: Mapping[str, Any]) -> dict[str, Any]:
-    """The changes as a dict, if all of their names are texts."""
+    """Return the changes as a dict, if all of their names are texts."""
     pairs = list(changes.items())
     for name, value in pairs:
         if not isinstance(name, str):
@@ -63,7 +63,7 @@ def _named(settings: object, changes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _replaced(settings: Settings, changes: Mapping[str, Any]) -> Settings:
-    """Like dataclasses.replace, into nested parts, with a named error for an unknown field."""
+    """Replace fields as dataclasses.replace does, into nested parts; an unknown one gives a named error."""
     changes = _named(settings, changes)
     fields = [f.name for f in dataclasses.fields(settings)]  # type: ignore[arg-type]
     known = [*fields, *(_SHORT if isinstance(settings, Scenario) else ())]

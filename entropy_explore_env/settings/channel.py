@@ -117,7 +117,7 @@ class Channel:
         self._check_phases()
 
     def _check_contents(self) -> None:
-        """Settings of summaries where there are any, and only there."""
+        """Check that settings of summaries are given where robots send some, and only there."""
         if self.content == "summaries":
             if self.burst == 0:
                 raise SettingError("Channel.burst", 0, "above 0 where robots send summaries")
@@ -133,7 +133,7 @@ class Channel:
                 raise SettingError(f"Channel.{name}", getattr(self, name), allowed)
 
     def _check_phases(self) -> None:
-        """Repeats fit into phases, and a batch waits for one reason only."""
+        """Check that repeats fit into phases, and that a batch waits for one reason only."""
         if self.phase_s == 0.0:
             if self.repeats > 1:
                 allowed = "1 without phase_s: batches are sent at once, and once"

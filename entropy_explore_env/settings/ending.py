@@ -19,7 +19,7 @@ SIGMA_PRIOR = 30.0
 
 
 def gaussian_entropy_bits(sigma: float) -> float:
-    """Differential entropy of a Gaussian in bits, log2 √(2πe) + log2 σ (Rocha04, eq. 15)."""
+    """Return the differential entropy of a Gaussian in bits, log2 √(2πe) + log2 σ (Rocha04, eq. 15)."""
     return BITS_OF_UNIT_GAUSSIAN + math.log2(sigma)
 
 

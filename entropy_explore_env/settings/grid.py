@@ -58,16 +58,16 @@ class Grid:
         return np.asarray(self.shape) * self.voxel_size_m
 
     def voxel_of(self, position_m: np.ndarray) -> np.ndarray:
-        """Indices (..., 3) int64 of the voxels that hold the points (..., 3), map frame, metres."""
+        """Return the indices (..., 3) int64 of the voxels that hold points (..., 3), map frame, metres."""
         scaled = (np.asarray(position_m) - np.asarray(self.origin_m)) / self.voxel_size_m
         return np.floor(scaled).astype(np.int64)
 
     def in_grid_units(self, pose: np.ndarray) -> np.ndarray:
-        """(N,) a pose or viewpoint, x, y, z first, with its place in voxel edges from the lower corner."""
+        """Return a pose or viewpoint (N,), x, y, z first, its place in voxel edges from the lower corner."""
         converted = pose.copy()
         converted[:3] = (converted[:3] - np.asarray(self.origin_m)) / self.voxel_size_m
         return converted
 
     def centre_of(self, voxel: np.ndarray) -> np.ndarray:
-        """Centres (..., 3) in metres, map frame, of the voxels with indices (..., 3)."""
+        """Return the centres (..., 3) in metres, map frame, of the voxels with indices (..., 3)."""
         return np.asarray(self.origin_m) + (np.asarray(voxel) + 0.5) * self.voxel_size_m

@@ -22,7 +22,7 @@ INFINITY = "inf"
 
 
 def settings_of(scenario: Scenario) -> dict[str, Any]:
-    """A scenario's settings as what JSON holds: objects, lists, texts, numbers, true, false and null.
+    """Return a scenario's settings as what JSON holds: objects, lists, texts, numbers, true, false and null.
 
     `scenario_of` gives the same scenario back, also after `json.dumps` and `json.loads`.
     """
@@ -30,7 +30,7 @@ def settings_of(scenario: Scenario) -> dict[str, Any]:
 
 
 def scenario_of(settings: Mapping[str, Any]) -> Scenario:
-    """The scenario with these settings.
+    """Return the scenario with these settings.
 
     Args:
         settings: As `settings_of` gives them. What is missing has its default, if it has one.
@@ -42,12 +42,12 @@ def scenario_of(settings: Mapping[str, Any]) -> Scenario:
 
 
 def json_of(settings: Any) -> Any:  # noqa: ANN401 - a dataclass, or what one may hold
-    """Settings of any dataclass as what JSON holds; `dataclass_of` gives the same back."""
+    """Return the settings of any dataclass as what JSON holds; `dataclass_of` gives the same back."""
     return _encoded(settings)
 
 
 def dataclass_of(kind: type[Settings], settings: Any, name: str = "settings") -> Settings:  # noqa: ANN401
-    """A dataclass from an object of its fields, as JSON holds it.
+    """Return a dataclass from an object of its fields, as JSON holds it.
 
     Args:
         kind: The dataclass.
@@ -61,12 +61,12 @@ def dataclass_of(kind: type[Settings], settings: Any, name: str = "settings") ->
 
 
 def settings_json(scenario: Scenario) -> str:
-    """A scenario's settings as the text of one JSON object."""
+    """Return a scenario's settings as the text of one JSON object."""
     return json.dumps(settings_of(scenario), allow_nan=False)
 
 
 def scenario_from_json(text: str) -> Scenario:
-    """The scenario that `settings_json` wrote.
+    """Return the scenario that `settings_json` wrote.
 
     Raises:
         SettingError: The text is not JSON, or see `scenario_of`.
@@ -89,7 +89,7 @@ def _encoded(value: Any) -> Any:  # noqa: ANN401 - whatever a setting may be
 
 
 def _decoded(hint: Any, value: Any, name: str) -> Any:  # noqa: ANN401 - whatever a setting may be
-    """The value of a setting whose annotation is `hint`; the settings check themselves what it must be."""
+    """Return the value of a setting of annotation `hint`; the settings check themselves what it is."""
     if typing.get_origin(hint) in (typing.Union, types.UnionType):
         return _decoded(_member(hint, value), value, name)
     if dataclasses.is_dataclass(hint):
@@ -115,7 +115,7 @@ def _member(hint: Any, value: Any) -> Any:  # noqa: ANN401 - of a union: the kin
 
 
 def _part(kind: type, value: Any, name: str) -> Any:  # noqa: ANN401 - an object of the kind
-    """A dataclass from an object of its fields."""
+    """Return a dataclass from an object of its fields."""
     hints = _hints(kind)
     if not isinstance(value, Mapping):
         raise SettingError(name, value, f"an object with the fields of {kind.__name__}")

@@ -215,7 +215,7 @@ class Scenario:
         return (RobotKind(self.robot, self.sensor), *self.extra_kinds)[: self.robots]
 
     def kind_of(self, robot: int) -> RobotKind:
-        """What a robot of the team, by its number, is."""
+        """Return what a robot of the team, by its number, is."""
         return self.kinds[robot % len(self.kinds)]
 
     @property
@@ -264,7 +264,7 @@ class Scenario:
         return min(math.floor(min(sent, 1e9)) + 2, self._scans_within(self.longest_delay_s))
 
     def _scans_within(self, time_s: float) -> int:
-        """Scans that a robot can take in this time, and two more."""
+        """Return the scans that a robot can take in this time, and two more."""
         apart_s = min(
             min(kind.sensor.scan_time_s, kind.sensor.scan_every_m / kind.robot.max_speed_m_s)
             for kind in self.kinds
@@ -296,11 +296,11 @@ class Scenario:
         return all(self.layer_of(kind.robot) is not None for kind in self.kinds)
 
     def looks_level(self, robot: Robot) -> bool:
-        """Whether a kind of robot stays in a plane and its sensor never looks up or down."""
+        """Return whether a kind of robot stays in a plane and its sensor never looks up or down."""
         return self.layer_of(robot) is not None and (self.grid.flat or not robot.tilts)
 
     def ground_layer_of(self, robot: Robot) -> int | None:
-        """Voxel layer of the ground that must carry a kind of robot, < 0 below all; None if it needs none."""
+        """Return the voxel layer that must carry a kind of robot, < 0 below all; None if it needs none."""
         layer = self.layer_of(robot)
         if self.grid.flat or layer is None or robot.above_ground_m is None:
             return None
@@ -308,7 +308,7 @@ class Scenario:
         return math.floor(below_m / self.grid.voxel_size_m + 1e-9) - 1
 
     def layer_of(self, robot: Robot) -> int | None:
-        """Voxel layer in which a kind of robot and its sensor stay; None if it flies.
+        """Return the voxel layer in which a kind of robot and its sensor stay; None if it flies.
 
         Planar robots have one, and in 2-D worlds any robot.
         """
@@ -318,7 +318,7 @@ class Scenario:
         return int(layers + 1e-9) if robot.motion == "planar" else None  # 0.3 / 0.1 is 3
 
     def plane_m(self, robot: int) -> float | None:
-        """Height z, in the map frame, of the plane in which a robot of the team stays; None if it flies."""
+        """Return the height z, map frame, of the plane in which a robot stays; None if it flies."""
         layer = self.layer_of(self.kind_of(robot).robot)
         return None if layer is None else float(self.grid.centre_of(np.array([0, 0, layer]))[2])
 
@@ -340,13 +340,13 @@ class Scenario:
 
 
 def driving_time_s(robot: Robot, length_m: float) -> float:
-    """Seconds from rest to rest at most: up to top speed, and down again, with or without time between."""
+    """Return the seconds from rest to rest: up to top speed and down again, with or without time between."""
     ramp_s = min(robot.max_speed_m_s / robot.acceleration_m_s2, math.sqrt(length_m / robot.acceleration_m_s2))
     return length_m / robot.max_speed_m_s + ramp_s
 
 
 def _level(sensor: RangeSensor) -> RangeSensor:
-    """The sensor without pitch."""
+    """Return the sensor without pitch."""
     return dataclasses.replace(sensor, field_of_view_rad=(sensor.field_of_view_rad[0], 0.0))
 
 

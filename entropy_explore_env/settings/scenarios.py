@@ -313,7 +313,7 @@ SCENARIOS = MappingProxyType(
 
 
 def find_scenario(scenario: str | Scenario, robots: object = None) -> Scenario:
-    """The scenario with a name; a Scenario is given back as it is.
+    """Return the scenario with a name; a Scenario is given back as it is.
 
     Args:
         scenario: The name.

@@ -93,5 +93,5 @@ class RangeSensor:
 
 
 def centred_angles(samples: int, step_rad: float) -> np.ndarray:
-    """(samples,) float64 angles around a gaze, in its middle, `step_rad` apart."""
+    """Return (samples,) float64 angles around a gaze, in its middle, `step_rad` apart."""
     return (np.arange(samples) - (samples - 1) / 2.0) * step_rad

@@ -15,7 +15,7 @@ from entropy_explore_env.errors import SettingError, one_of
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether it is a number that a float64 can hold: ±inf is one, NaN and booleans are not."""
+    """Return whether it is a number that a float64 can hold: ±inf is one, NaN and booleans are not."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         return False
     try:
@@ -25,7 +25,7 @@ def is_number(value: object) -> TypeGuard[float]:
 
 
 def is_whole(value: object, least: int, most: int | None = None) -> TypeGuard[int]:
-    """Whether it is a whole number in a range; booleans are not."""
+    """Return whether it is a whole number in a range; booleans are not."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
         return False
     return bool(least <= value and (most is None or value <= most))
@@ -44,7 +44,7 @@ def check_instance(name: str, value: object, kind: type, error: type[SettingErro
 
 
 def checked_path(name: str, value: object, allowed: str = "the path of a file") -> Path:
-    """A path from outside, with `~` at its beginning as the home folder that it stands for.
+    """Return a path from outside, with `~` at its beginning as the home folder that it stands for.
 
     Raises:
         SettingError: It is no path, or there is no such home folder.
@@ -66,7 +66,7 @@ def check(settings: object, name: str, allowed: str, accepts: Callable[[Any], bo
 
 
 def check_positive(settings: object, *names: str, finite: bool = True) -> None:
-    """Each field is a number > 0, finite unless said otherwise."""
+    """Check that each field is a number > 0, finite unless said otherwise."""
     allowed = "a number > 0" + ("" if finite else ", or inf")
     for name in names:
         check(settings, name, allowed, lambda v: v > 0 and (math.isfinite(v) or not finite))
@@ -75,7 +75,7 @@ def check_positive(settings: object, *names: str, finite: bool = True) -> None:
 def check_within(
     settings: object, *names: str, least: float, most: float, zero: bool = False, inf: bool = False
 ) -> None:
-    """Each field is a number in a range, both ends allowed; or 0, or inf, where these are said."""
+    """Check that each field is a number in a range, ends included; or 0, or inf, where these are said."""
     others = [word for word, also in (("0", zero), ("inf", inf)) if also]
     allowed = " or ".join([f"a number from {least:g} to {most:g}", *others])
     for name in names:
@@ -88,13 +88,13 @@ def check_within(
 
 
 def check_not_negative(settings: object, *names: str) -> None:
-    """Each field is a finite number ≥ 0."""
+    """Check that each field is a finite number ≥ 0."""
     for name in names:
         check(settings, name, "a finite number ≥ 0", lambda v: v >= 0 and math.isfinite(v))
 
 
 def check_count(settings: object, name: str, least: int, most: int) -> None:
-    """The field is a whole number in a range."""
+    """Check that the field is a whole number in a range."""
     value = getattr(settings, name)
     if not is_whole(value, least, most):
         raise SettingError(
@@ -103,7 +103,7 @@ def check_count(settings: object, name: str, least: int, most: int) -> None:
 
 
 def check_counts(settings: object, name: str, least: int, most: int) -> None:
-    """The field is three whole numbers, each in a range."""
+    """Check that the field is three whole numbers, each in a range."""
     value = getattr(settings, name)
     if not isinstance(value, tuple) or len(value) != 3 or not all(is_whole(n, least, most) for n in value):
         allowed = f"a tuple of three whole numbers (x, y, z), each from {least} to {most}"
@@ -111,14 +111,14 @@ def check_counts(settings: object, name: str, least: int, most: int) -> None:
 
 
 def check_choice(settings: object, name: str, choices: object) -> None:
-    """The field is one of the values of a Literal."""
+    """Check that the field is one of the values of a Literal."""
     value, members = getattr(settings, name), get_args(choices)
     if not isinstance(value, str) or value not in members:
         raise SettingError(f"{type(settings).__name__}.{name}", value, one_of(value, members))
 
 
 def check_kind(settings: object, name: str, kind: type) -> None:
-    """The field is an instance of a class."""
+    """Check that the field is an instance of a class."""
     value = getattr(settings, name)
     if not isinstance(value, kind):
         raise SettingError(
@@ -127,7 +127,7 @@ def check_kind(settings: object, name: str, kind: type) -> None:
 
 
 def _as_part(kind: type, value: object) -> str:
-    """How a part of the settings is written where a value was given that belongs into one of its fields."""
+    """Return how a part of the settings is written, where a value of one of its fields was given."""
     if not dataclasses.is_dataclass(kind):
         return ""
     names = [each.name for each in dataclasses.fields(kind)]
