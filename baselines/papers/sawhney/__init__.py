@@ -29,7 +29,7 @@ EXPERIMENT = Experiment(
     tables={"changed": claims.changed_table, "maps": claims.maps_table},
     values={"held": claims.held_of_paper},
     seeds=40,
-    quick_seeds=3,
+    quick_seeds=2,
     least_seeds=2,
     takes_worlds=True,
 )
