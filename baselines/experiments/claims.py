@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from baselines.experiments.statistics import Interval
@@ -14,6 +14,8 @@ _DIGITS = 4
 """Significant digits of figures below 1000; above, whole numbers."""
 _FEW = 3
 """Figures of a paper that stand in a line of a group of claims."""
+COLUMNS = ("id", "claim", "paper", "ours", "low", "high", "holds")
+"""Of claims as JSON and CSV."""
 SAME = "the number"
 """The paper claims that something is above or below the number to which it is compared."""
 
@@ -42,7 +44,7 @@ class Claim:
 
     def row(self) -> dict[str, Any]:
         """As JSON has it."""
-        return asdict(self)
+        return {name: getattr(self, name) for name in COLUMNS}
 
 
 def above(
@@ -73,10 +75,8 @@ def told(claims: Sequence[Claim], groups: Mapping[str, str]) -> list[Claim]:
     Raises:
         SettingError: A claim is in no group.
     """
-    return [
-        replace(each, claim=": ".join(filter(None, [groups[_group_of(each, groups)], each.claim])))
-        for each in claims
-    ]
+    texts = [groups[_group_of(each, groups)] + (f" ({each.claim})" if each.claim else "") for each in claims]
+    return [replace(each, claim=text) for each, text in zip(claims, texts, strict=True)]
 
 
 def groups_table(claims: Sequence[Claim], groups: Mapping[str, str]) -> str:
@@ -127,7 +127,7 @@ def _ours_of(claims: Sequence[Claim]) -> str:
 
 def claims_csv(claims: Sequence[Claim]) -> str:
     """Return all claims as CSV, a line each."""
-    return csv_table({each.name: [getattr(claim, each.name) for claim in claims] for each in fields(Claim)})
+    return csv_table({name: [getattr(claim, name) for claim in claims] for name in COLUMNS})
 
 
 def print_claims(claims: Sequence[Claim], paper: str) -> None:

@@ -21,7 +21,7 @@ OTHERS = [
 
 def test_a_claim_is_a_row_of_json_and_of_csv():
     row = CLAIM.row()
-    assert list(row) == ["id", "paper", "ours", "low", "high", "holds", "claim"]
+    assert list(row) == ["id", "claim", "paper", "ours", "low", "high", "holds"]
     assert json.loads(json.dumps(row)) == row
     (found,) = csv.DictReader(io.StringIO(claims_csv([CLAIM])))
     assert found["ours"] == "0.51239" and found["holds"] == "True"
@@ -36,7 +36,7 @@ def test_claims_stand_in_groups_with_what_ours_span_and_how_many_hold():
     with pytest.raises(SettingError, match="claim = 'u': expected one in a group: t-"):
         groups_table(OTHERS, {"t-": "it falls"})
     texts = [claim.claim for claim in told([CLAIM, OTHERS[0]], {"t-": "it falls"})]
-    assert texts == ["it falls: from 2", "it falls"]
+    assert texts == ["it falls (from 2)", "it falls"]
 
 
 def test_above_and_below_ask_for_the_whole_interval():
