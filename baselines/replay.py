@@ -19,8 +19,9 @@ from typing import Annotated
 
 import numpy as np
 
+from baselines.cli import bag_replay
 from baselines.cli.arguments import parse, run_command
-from baselines.cli.bag_replay import is_bag, replay_bag
+from baselines.cli.bag_replay import BagArgs, is_bag, replay_bag
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
 from baselines.cli.options import Also, Mark
 from baselines.cli.progress import progress_bar
@@ -62,7 +63,7 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     if is_bag(words):
-        return replay_bag(words)
+        return replay_bag(parse(BagArgs, words, description=bag_replay.__doc__))
     _refuse_settings(words)
     args = parse(Args, words, description=__doc__)
     allow_read_memory(args.read_memory_mib)

@@ -49,8 +49,9 @@ def options_of_command(module: str, words: list[str]) -> set[str]:
         with contextlib.redirect_stdout(said), contextlib.suppress(SystemExit):
             importlib.import_module(PARTS[words[0]][0]).main([*words[1:2], "--help"])
         return {*_OPTION.findall(said.getvalue())}
-    args = importlib.import_module(module if _file(module).is_file() else f"{module}.__main__").Args
-    options = options_of(args, args())
+    file = importlib.import_module(module if _file(module).is_file() else f"{module}.__main__")
+    classes = [getattr(file, name) for name in ("Args", "BagArgs") if hasattr(file, name)]
+    options = [option for args in classes for option in options_of(args, args())]
     return {flag for option in options for flag in (option.flag, option.opposite, *option.also)}
 
 

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 from tabulate import tabulate
 
-from baselines.cli.arguments import parse, print_json
+from baselines.cli.arguments import print_json
 from baselines.cli.options import Mark
 from baselines.strategies import make_strategy
 from entropy_explore_env.errors import RecordError, SettingError
@@ -62,9 +62,8 @@ def is_bag(words: Sequence[str]) -> bool:
     return path.is_dir() or path.suffix in SUFFIXES
 
 
-def replay_bag(words: Sequence[str]) -> int:
-    """Run the command."""
-    args = parse(BagArgs, words, description=__doc__)
+def replay_bag(args: BagArgs) -> int:
+    """Print a strategy's decisions on the maps of a bag."""
     check_whole("seed", args.seed, 0)
     if not 0.0 <= args.every_s < np.inf:
         raise SettingError("every_s", args.every_s, "finite seconds ≥ 0")

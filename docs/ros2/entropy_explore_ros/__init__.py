@@ -1,0 +1,1 @@
+"""The node that explores with Nav2."""
