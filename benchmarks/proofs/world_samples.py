@@ -41,10 +41,15 @@ def pgm(shades: np.ndarray) -> bytes:
 
 def png(pixels: np.ndarray) -> bytes:
     """A PNG of these pixels."""
+    return image(pixels, "PNG")
+
+
+def image(pixels: np.ndarray, kind: str) -> bytes:
+    """An image of these pixels, of a kind by Pillow's name."""
     from PIL import Image
 
     buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, "PNG")
+    Image.fromarray(pixels).save(buffer, kind)
     return buffer.getvalue()
 
 
@@ -86,6 +91,18 @@ def ply(binary: bool) -> bytes:
     return head + (some.tobytes() if binary else b"".join(b"%g %g %g\n" % tuple(p) for p in some.tolist()))
 
 
+def las(compressed: bool) -> bytes:
+    """A laser scan of `points`, `.las` or `.laz`."""
+    import laspy
+
+    scan = laspy.create(point_format=3, file_version="1.4")
+    scan.header.scales = [0.001] * 3
+    scan.x, scan.y, scan.z = points().T.astype(np.float64)
+    buffer = io.BytesIO()
+    scan.write(buffer, do_compress=compressed)
+    return buffer.getvalue()
+
+
 def mesh(kind: str) -> bytes:
     """A box and a ramp in a format of trimesh."""
     import trimesh
@@ -102,6 +119,13 @@ def mesh(kind: str) -> bytes:
 def heights(rows: int = 11, columns: int = 7) -> np.ndarray:
     """(rows, columns) float32 metres."""
     return np.random.default_rng(2).uniform(10.0, 14.0, (rows, columns)).astype(np.float32)
+
+
+def esri_grid() -> bytes:
+    """An ESRI ASCII grid of `heights`, by hand."""
+    rows = heights()
+    head = f"ncols {rows.shape[1]}\nnrows {rows.shape[0]}\nxllcorner 100\nyllcorner 200\ncellsize 1\n"
+    return (head + "\n".join(" ".join(f"{height:.3f}" for height in row) for row in rows)).encode()
 
 
 def npz(**arrays: Any) -> bytes:  # noqa: ANN401 - whatever an archive may hold
@@ -164,8 +188,15 @@ def samples() -> dict[str, list[Sample]]:
             Sample({"map.yaml": YAML.replace(b"pgm", b"png"), "plan.png": png(plan())}, {}),
         ],
         "image": [Sample({"plan.png": png(sketch())}, {}), Sample({"plan.pgm": pgm(sketch())}, {})],
+        "other images": [
+            Sample({f"plan.{suffix}": image(sketch(), kind)}, {})
+            for suffix, kind in (("jpg", "JPEG"), ("bmp", "BMP"), ("gif", "GIF"))
+        ],
         "height png": [Sample({"hills.png": png(deep)}, {"resolution_m": 1.0, "elevation_step_m": 0.001})],
         "pcd": [Sample({"cloud.pcd": pcd(each)}, cell) for each in ("ascii", "binary", "binary_compressed")],
+        "las": [Sample({"scan.las": las(False)}, cell), Sample({"scan.laz": las(True)}, cell)],
+        "esri grid": [Sample({"hills.asc": esri_grid()}, {})],
+        "dae": [Sample({"box.dae": mesh("dae")}, cell)],
         "ply": [
             Sample({"cloud.ply": ply(True)}, cell),
             Sample({"cloud.ply": ply(False)}, cell),
@@ -178,6 +209,7 @@ def samples() -> dict[str, list[Sample]]:
         "geotiff": [
             Sample({"hills.tif": geotiff(heights())}, {}),
             Sample({"hills.tif": geotiff(heights(), compression="zlib")}, {}),
+            Sample({"hills.tif": geotiff(heights(), compression="lzw", predictor=3)}, {}),
         ],
         "world npz": [Sample({"lab.npz": saved_world()}, {})],
     }

@@ -3,9 +3,9 @@
 Spacing and corner come from its tags (ModelPixelScale and ModelTiepoint, or ModelTransformation; OGC GeoTIFF
 1.1), with or without a directory of keys; degrees become metres at the latitude of the map's middle, counted
 from its south-west corner. Heights are those of GDAL: samples equal to its nodata, in the raster's type, are
-unknown, others are scaled and offset as its metadata say. Units across and up are metres unless the keys or
-GDAL's metadata name another one; feet and kilometres are converted. A TIFF without tags of place needs
-`resolution_m`.
+unknown, others are scaled and offset as its metadata say. Units across and up are those that the keys or
+GDAL's metadata name, else those of the reference system whose EPSG code the keys state (looked up with
+pyproj), else metres; feet and kilometres are converted. A TIFF without tags of place needs `resolution_m`.
 """
 
 from __future__ import annotations
@@ -39,6 +39,10 @@ _METRES_BY_NAME = {
     **dict.fromkeys(("us-ft", "ftus", "us survey foot", "us survey feet", "foot_us"), _SURVEY_FOOT),
 }
 _UNITS = "metres, kilometres, feet or US survey feet"
+_SYSTEM_OF_UNITS = {"ProjLinearUnits": "ProjectedCSTypeGeoKey", "VerticalUnits": "VerticalCSTypeGeoKey"}
+"""Which key states the reference system whose unit holds where no key states the unit."""
+_LAST_SYSTEM = 32766
+"""EPSG codes of reference systems in keys end here; 32767 is a system that the file describes itself."""
 
 
 class _Place(NamedTuple):
@@ -141,10 +145,31 @@ def _unit_m(keys: Mapping[str, Any], name: str) -> float:
     Args:
         keys: Name of a GeoKey → its value.
         name: `ProjLinearUnits` or `VerticalUnits`.
+
+    Raises:
+        RefusedError: The unit is none that is known.
+        MissingExtraError: pyproj is not installed, which knows the unit of a reference system.
     """
-    code = int(keys.get(f"{name}GeoKey", 9001))
+    if f"{name}GeoKey" not in keys:
+        return _unit_of_system_m(int(keys.get(_SYSTEM_OF_UNITS[name], 0)))
+    code = int(keys[f"{name}GeoKey"])
     if code == _OWN_UNIT and 0 < float(keys.get("ProjLinearUnitSizeGeoKey", 0.0)) < math.inf:
         return float(keys["ProjLinearUnitSizeGeoKey"])
     if code not in _METRES:
         raise RefusedError(f"a GeoTIFF whose {name} are {_UNITS}, not EPSG {code}")
     return _METRES[code]
+
+
+def _unit_of_system_m(code: int) -> float:
+    """Metres of the unit of a reference system with an EPSG code; 1 where there is no such code."""
+    if not 0 < code <= _LAST_SYSTEM:
+        return 1.0
+    try:
+        from pyproj import CRS
+        from pyproj.exceptions import CRSError
+    except ImportError:
+        raise MissingExtraError("pyproj", "worlds") from None
+    try:
+        return float(CRS.from_epsg(code).axis_info[0].unit_conversion_factor)
+    except CRSError:
+        raise RefusedError(f"a GeoTIFF whose reference system is known, not EPSG {code}") from None

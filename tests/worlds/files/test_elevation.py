@@ -179,6 +179,11 @@ FOOT, SURVEY_FOOT = 0.3048, 1200 / 3937
         ([(3076, 9002), (4099, 9002)], FOOT, FOOT),
         ([(4099, 9003)], 1.0, SURVEY_FOOT),
         ([(3076, 9036)], 1000.0, 1.0),
+        ([(3072, 2263)], SURVEY_FOOT, 1.0),  # New York's plane, in feet; no key says so
+        ([(3072, 32633)], 1.0, 1.0),
+        ([(3072, 2263), (3076, 9001)], 1.0, 1.0),  # a unit that is stated counts
+        ([(4096, 6360)], 1.0, SURVEY_FOOT),  # NAVD88 height in feet
+        ([(3072, 32767)], 1.0, 1.0),
     ],
 )
 def test_feet_and_kilometres_become_metres(tmp_path, entries, across_m, up_m):
@@ -195,6 +200,9 @@ def test_other_units_are_refused_by_name(tmp_path):
     path = tmp_path / "hills.tif"
     path.write_bytes(keyed((3076, 9005)))
     with pytest.raises(WorldError, match=r"ProjLinearUnits are metres, .* not EPSG 9005"):
+        load_world(path)
+    path.write_bytes(keyed((3072, 2)))
+    with pytest.raises(WorldError, match=r"reference system is known, not EPSG 2"):
         load_world(path)
 
 
