@@ -18,11 +18,11 @@ class Action:
     Attributes:
         kind: `continuous`, a Box(-1, 1); `discrete`, moves by whole voxels × gaze directions; or
             `candidates`, the number of one of the viewpoints that a planner proposes to the robot.
-        moves: Discrete moves: `all` voxels within reach, or `axes`: stay, and as far as reach and voxels
-            allow along each axis, both ways, which is 7 moves (5 of planar robots) to learn from.
+        moves: Discrete moves: `all` voxels within reach, or `axes`, to stay and the farthest voxel each way
+            along each axis: 7 moves, 5 for planar robots.
         yaws: Discrete gazes around the horizon.
         pitches: Discrete gazes up and down, from -π/4 to π/4; planar robots have one, level.
-        candidates: K, viewpoints that are proposed at most, 1 to 64; the first is the planner's own choice.
+        candidates: Largest number K of proposed viewpoints, 1 to 64; the first is the planner's own choice.
     """
 
     kind: Literal["continuous", "discrete", "candidates"] = "continuous"

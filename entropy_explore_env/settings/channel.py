@@ -26,7 +26,7 @@ class Signal:
             sender's power, less what the first metre takes (40 dB at 2.4 GHz), less the weakest signal
             that is understood.
         exponent: How fast the signal weakens in the open, 0 to 10: 2 in free space.
-        wall_loss_db_per_m: Of solid voxels, 0 to 1e4.
+        wall_loss_db_per_m: Loss in solid voxels, 0 to 1e4.
     """
 
     budget_db: float = 40.0
@@ -56,24 +56,23 @@ class Channel:
 
     Attributes:
         content: `measurements` or `summaries`.
-        summary_every_s: Least time from one summary of a robot to its next one, 1e-3 to 3600; 0 = at every
-            scan. Where robots send no summaries it stays at its default.
-        summary_threshold_bits: Most information content of a region of a summary that is told by one mean
-            and one σ, 0 to 5: 0 = only what is alike, 5 = all that was measured throughout. It stays at its
-            default, likewise.
+        summary_every_s: Least time between two summaries of a robot, 1e-3 to 3600; 0 = at every scan. Only
+            with summaries.
+        summary_threshold_bits: Largest information content of a region that a summary gives one mean and one
+            σ, 0 to 5: 0 = only equal voxels, 5 = every region measured throughout. Only with summaries.
         burst: Most measurements of one batch; 0 shares none. Above 0 where robots send summaries, whose size
             it does not limit.
         i_min_bits: I_min, the least utility of a measurement that is worth sending, 0 to 1e6. Measurements
             that bring less count as redundant, also where robots send summaries.
-        i_min_fill: None keeps I_min. A number lets each robot steer its own, from i_min_bits on, so that
-            on average over its scans so many bursts of measurements reach it (Rocha04, sect. 5.1.1).
+        i_min_fill: Share of the burst that reaches I_min on average, above 0 to 10: each robot steers its own
+            I_min, from i_min_bits on (Rocha04, sect. 5.1.1). None = I_min stays.
         range_m: Farthest teammate that hears, 1e-9 to 1e6; inf = all.
-        reach: What else a message must come through: `distance` nothing; `line_of_sight` reaches a teammate
-            where no solid voxel of the true world is on the straight line between the two; `signal` where
-            the signal is strong enough. Bodies of robots are in no message's way.
-        signal: How strong it is.
-        loss_probability: Of a message on its way to one teammate.
-        delay_s: From sending to hearing, 0 to 3600.
+        reach: Condition beside the range: `distance`, none; `line_of_sight`, no solid voxel of the true world
+            on the straight line between the two robots; `signal`, a signal that is strong enough. Bodies of
+            robots stop no message.
+        signal: Strength of signals.
+        loss_probability: Probability that a message is lost on its way to one teammate.
+        delay_s: Time from sending to hearing, 0 to 3600.
         announcements: Whether robots announce the viewpoints that they choose.
         phase_s: Length of a phase of the broadcast, 1e-3 to 3600; 0 = batches are sent at once.
         repeats: How often a phase's batches are sent in the next phase, evenly spread over it; 1e-3 s apart

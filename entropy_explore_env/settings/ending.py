@@ -43,16 +43,16 @@ class Ending:
 
     Attributes:
         sigma_end: Standard deviation of coverage at which a voxel counts as known.
-        termination: Whose map has to pass the threshold: `any` robot's, or that of `all` robots. `shared`:
-            the map of every robot that still works, which is every one that has not stopped for good
-            (`Faults.stop`), so that what is known has been shared. With `seen_share` or `unseen_free_voxels`
-            the first two are about what the team has seen together, and with `shared` every such robot's own
-            map must hold so much: what it measured itself or fused from messages.
-        seen_share: The mission ends when the team has seen this share of what can be seen; None = by entropy.
-        unseen_free_voxels: It ends when no more free voxels than this are unseen of those that can be seen.
+        termination: Whose map has to pass the threshold: `any` robot's, that of `all` robots, or with
+            `shared` that of every robot that has not stopped for good (`Faults.stop`). With `seen_share` or
+            `unseen_free_voxels`, `any` and `all` mean what the team has seen together, and `shared` what each
+            such robot's own map holds.
+        seen_share: Share of what can be seen at which the mission ends; None = by entropy.
+        unseen_free_voxels: Number of unseen free voxels, of those that can be seen, at which the mission
+            ends; None = by entropy, or by `seen_share`.
         time_limit_s: Simulated time after which the mission is cut off (a truncation), 1e-3 to 1e9; inf =
             never.
-        max_cycles: Steps after which it is cut off; None = never.
+        max_cycles: Steps after which the mission is cut off; None = never.
     """
 
     sigma_end: float = 0.03

@@ -24,14 +24,14 @@ def _check_robots(settings: Outage | SensorFault | RadioFault) -> None:
 class Outage:
     """When something of a robot fails, once in a mission, and for how long.
 
-    Where a time is given and one is drawn, too, the earlier one counts.
+    Of a given time and a drawn one the earlier counts.
 
     Attributes:
-        at_s: Simulated time at which it fails, 1e-3 to 1e9; inf = at no given time.
-        mean_s: It also fails at a time drawn for each robot from the exponential distribution with this mean,
-            1e-3 to 1e9; inf = at no drawn time.
-        lasts_s: Until it works again, 1e-3 to 1e9; inf = never again.
-        robots: Numbers of the robots that it happens to; empty = all.
+        at_s: Simulated time of the failure, 1e-3 to 1e9; inf = at no given time.
+        mean_s: Mean of the exponential distribution from which each robot draws a time of failure, 1e-3 to
+            1e9; inf = at no drawn time.
+        lasts_s: Time from the failure until the robot works again, 1e-3 to 1e9; inf = for ever.
+        robots: Numbers of the robots that fail; empty = all.
     """
 
     at_s: float = math.inf
@@ -52,14 +52,14 @@ class Outage:
 
 @dataclass(frozen=True)
 class SensorFault:
-    """What is wrong with range sensors all through a mission.
+    """What is wrong with range sensors throughout a mission.
 
     Attributes:
         lost_rays: Probability that a ray brings no measurement, 0 to 1; each ray on its own.
-        range_factor: Measured distances of hits are the true ones times this factor, 0.1 to 10, …
-        range_bias_m: … plus this, -1e6 to 1e6; not below a thousandth of a voxel edge, nor beyond the range.
-            `RangeSensor.min_range_m` applies before and after.
-        robots: Numbers of the robots that have such a sensor; empty = all.
+        range_factor: Scale of the measured distance of hits, 0.1 to 10.
+        range_bias_m: Offset added to the scaled distance, -1e6 to 1e6. The result is at least a thousandth of
+            a voxel edge and at most the range; `RangeSensor.min_range_m` applies before and after.
+        robots: Numbers of the robots with such a sensor; empty = all.
     """
 
     lost_rays: float = 0.0
@@ -82,19 +82,17 @@ class SensorFault:
 
 @dataclass(frozen=True)
 class RadioFault:
-    """What is wrong with radios all through a mission.
+    """What is wrong with radios throughout a mission.
 
     Attributes:
-        garbled: Probability that a message arrives garbled, 0 to 1: that is detected, and the message is
+        garbled: Probability that a received message is garbled, 0 to 1. Garbled messages are detected,
             dropped and counted.
-        repeated: Probability that a message arrives twice, 0 to 1: the second one is known by its number; it
-            costs its bits, is counted and changes nothing.
-        late: Probability that a message is sent late, 0 to 1: those sent after it overtake it. News that is
-            older than what a robot has heard changes neither where its sender was, nor where it goes to;
-            late measurements are fused all the same.
-        late_s: How long such messages wait before they are sent, 1e-3 to 3600.
-        robots: Numbers of the robots that have such a radio; empty = all. `garbled` and `repeated` are about
-            what they hear, `late` is about what they send.
+        repeated: Probability that a message is received twice, 0 to 1. The second copy is known by its
+            number: it costs its bits, is counted and changes nothing.
+        late: Probability that a message is sent late, 0 to 1, so that later ones overtake it. Old news
+            changes neither where its sender was nor where it goes; late measurements are fused.
+        late_s: Time that late messages wait before they are sent, 1e-3 to 3600.
+        robots: Numbers of the robots with such a radio; empty = all.
     """
 
     garbled: float = 0.0
@@ -124,12 +122,12 @@ class Faults:
     neither worlds, starts, noise nor the channel's losses.
 
     Attributes:
-        stop: The robot stops at once, wherever it is, and is switched off: it neither scans nor decides,
-            neither sends nor hears. Its body stays in the way, its map is not lost. When it works again it
-            decides anew. A mission in which all robots have stopped for good is cut off.
-        blind: The robot's scans measure nothing.
-        silent: The robot's radio is silent: what it sends reaches nobody, and it hears nothing.
-        sensor: Rays that are lost, and distances that are measured wrong.
+        stop: Outage of the robot: it stops at once, neither scans nor decides, neither sends nor hears. Its
+            body stays in the way, its map is kept, and when it works again it decides anew. A mission in
+            which all robots have stopped for good is cut off.
+        blind: Outage of the sensor: scans measure nothing.
+        silent: Outage of the radio: no message leaves the robot or reaches it.
+        sensor: Lost rays and wrong distances.
         radio: Messages that arrive garbled, twice, or out of order.
     """
 

@@ -23,18 +23,18 @@ class Fiducials:
     (`Localization`); nothing else changes with them.
 
     Attributes:
-        number: How many are drawn in each mission, 0 to 1000, on surfaces that robots can see: beside a face
-            that separates a free voxel from a solid one, or from the workspace's end.
-        positions_m: Their places instead, (x, y, z) each, in the map frame: in free space. In a 2-D world z
-            does not matter. Lists become tuples.
-        range_m: How far away they are sighted, 1e-6 to 1e6; inf = as far as the sensor sees.
+        number: Number of fiducials drawn in each mission, 0 to 1000, on surfaces that robots can see: beside
+            a face that separates a free voxel from a solid one, or from the workspace's end.
+        positions_m: Places of given fiducials, (x, y, z) each, in the map frame and in free space. In a 2-D
+            world z does not matter. Lists become tuples.
+        range_m: Largest distance of a sighting, 1e-6 to 1e6; inf = as far as the sensor sees.
         range_sigma_m: Standard deviation of a sighting along the line of sight, 1e-6 to 1e6.
-        bearing_sigma_rad: Of its direction, sideways and up, 1e-6 to 10.
-        own_number: How many landmarks each robot keeps besides, 0 to 64: corners in its own map, which it
-            chooses in its scans and sights again as it does those of the world. They take back what was
-            added to its error since it chose them, and no more.
-        own_score: Least worth of such a landmark (Sujan, eq. 17), 0 to 2: see `belief.landmark_score`.
-        own_apart_m: Least distance between two of them, 0 to 1e6.
+        bearing_sigma_rad: Standard deviation of a sighting's direction, sideways and up, 1e-6 to 10.
+        own_number: Number of landmarks that each robot keeps in its own map, 0 to 64: corners that it chooses
+            in its scans and sights again like fiducials. They take back the error added since it chose
+            them, and no more.
+        own_score: Least worth of a landmark of its own map (Sujan, eq. 17), 0 to 2: `belief.landmark_score`.
+        own_apart_m: Least distance between two landmarks of its own map, 0 to 1e6.
     """
 
     number: int = 0

@@ -19,13 +19,13 @@ class Localization:
     a planar one knows its height throughout.
 
     Attributes:
-        xy_m_per_sqrt_m: Of x and of y, after a metre driven; 0 to 100.
-        z_m_per_sqrt_m: Of the height of a robot that flies, after a metre driven; 0 to 100.
-        yaw_rad_per_sqrt_m: Of the yaw, after a metre driven; 0 to 10.
-        yaw_rad_per_sqrt_rad: Of the yaw, after a turn of a radian; 0 to 10.
-        margin_m: How much wider than its body a robot that drifts plans its paths, so that a small error does
-            not lead it into a wall; 0 to 100. A voxel's edge or two do, where passages are wide enough; true
-            obstacles still stop its body alone.
+        xy_m_per_sqrt_m: Standard deviation of x, and of y, after a metre driven, 0 to 100.
+        z_m_per_sqrt_m: Standard deviation of the height of a flying robot after a metre driven, 0 to 100.
+        yaw_rad_per_sqrt_m: Standard deviation of the yaw after a metre driven, 0 to 10.
+        yaw_rad_per_sqrt_rad: Standard deviation of the yaw after a turn of a radian, 0 to 10.
+        margin_m: Width added to the body when a robot that drifts plans a path, 0 to 100, so that a small
+            error does not lead it into a wall. One or two voxel edges suffice where passages are wide enough;
+            true obstacles stop the body itself.
     """
 
     xy_m_per_sqrt_m: float = 0.0

@@ -22,16 +22,16 @@ class Observation:
         drive: The robot's speed and the viewpoint that it chose last, for those that decide under way.
         team: Where teammates were last heard, and what they announced.
         patch: The belief around the robot.
-        patch_shape: Its voxels along x, y and z; odd, the robot in the middle.
+        patch_shape: Voxels of the patch along x, y and z; odd, the robot in the middle.
         overview: The whole belief, pooled.
         overview_shape: Cells of the pooled belief along x, y and z, at most the world's.
-        candidates: Candidates as actions: the features of each, and what is true of all of them (parts
-            `candidates` and `context`).
-        overlaps: Candidates as actions: how much of what one sees another sees, too.
-        action_mask: Actions by number: whether the mask is part of the observation, too.
-        flat: One Box of all parts, in the order of this list.
-        while_busy: Whether robots that cannot choose observe, too. False: they observe zeros until they
-            decide or the mission is over, which costs nothing.
+        candidates: With candidates as actions, the features of each (part `candidates`) and of all of them
+            (part `context`).
+        overlaps: With candidates as actions, the share of what one sees that another sees.
+        action_mask: With actions by number, the mask as a part of the observation.
+        flat: Whether the observation is one Box of all parts, in the order of this list.
+        while_busy: Whether robots that cannot choose observe, too; if not, they observe zeros until they
+            decide or the mission is over.
     """
 
     panorama: bool = True

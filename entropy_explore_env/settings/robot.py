@@ -25,29 +25,26 @@ class Robot:
         navigator: `straight` drives straight to the viewpoint; `planned` takes the cheapest way through
             the robot's own belief, below the ceiling where the world has one (all robots know where it
             is), without stopping at its corners.
-        unknown_cost: Planned paths: what a metre through unknown voxels costs, in metres through
-            known ones; ≥ 1.
+        unknown_cost: Cost of a metre through unknown voxels on planned paths, in metres through known ones,
+            1 to 1e6.
         reach_m: Largest displacement of one decision (ξ of Rocha04, eq. 32), 1e-6 to 1e6;
             inf = the workspace.
         max_speed_m_s: Top speed, 1e-4 to 1e4.
-        acceleration_m_s2: Of speeding up and of braking, 1e-4 to 1e6.
-        turn_rate_rad_s: Of yaw and pitch, while driving, 1e-4 to 1e6; inf = at once.
+        acceleration_m_s2: Acceleration and deceleration, 1e-4 to 1e6.
+        turn_rate_rad_s: Rate of yaw and pitch, while driving, 1e-4 to 1e6; inf = at once.
         body_radius_m: The body is a ball; 0 = a point that blocks nobody. At most 1e6.
         sensor_height_m: Planar robots: height of the sensor above the workspace's floor, 0 to 1e6.
         tilts: Planar robots: whether the sensor also looks up and down, as a camera on a mast; not in 2-D.
         above_ground_m: Planar robots: the sensor's height above the ground that must carry the robot, 1e-6 to
             1e6. A drive ends before a place below which some of the body's circle has no solid voxel there
             (MoveEnd.EDGE). None, and in 2-D: it needs no ground.
-        when_blocked: After a drive that a teammate cut short (MoveEnd.TEAMMATE), who may move on: `wander`
-            decides anew at once, and our strategies then wander; `wait` stands still first. Either way
-            the robot scans where it stopped, as after every drive, before that.
-        blocked_wait_s: `wait`: from the end of that scan until it decides, 1e-4 to 1e5; nothing else ends
-            the wait.
-        redecide: `at_stop`: the robot decides only where it stops. It decides while it drives, too, with
-            `on_scan` at every scan under way, which its sensor must take (`RangeSensor.scan_every_m`); with a
-            number whenever so many seconds, at least 0.01, have passed since it last decided. It drives on
-            meanwhile; missions/redecision.py says what a new decision does to the drive.
-        localization: How well the robot knows where it is; exactly by default.
+        when_blocked: What follows a drive that a teammate cut short (MoveEnd.TEAMMATE), after the scan where
+            it stopped: `wander` decides at once; `wait` stands still first.
+        blocked_wait_s: Time from that scan to the decision with `wait`, 1e-4 to 1e5.
+        redecide: When a robot decides: `at_stop`, only where it stops; `on_scan`, also at every scan under
+            way (`RangeSensor.scan_every_m`); a number, also whenever that many seconds, at least 0.01, have
+            passed since its last decision. It drives on meanwhile: see missions/redecision.py.
+        localization: Drift of the robot's estimate of its pose; none by default.
     """
 
     motion: Literal["free", "planar"] = "free"

@@ -43,7 +43,7 @@ class Scenario:
     """One task: a kind of world, the team in it, what it may do and when it is over.
 
     Attributes:
-        name: What people call it.
+        name: Name of the scenario.
         grid: Size and resolution of the workspace; a world from a file brings its own. In a world
             one voxel high robots look level and the sensor's field of view has no pitch.
         world: How the truth is made: the name of a recipe (`empty`, `furnished`, `office`, … in
@@ -52,16 +52,16 @@ class Scenario:
             (worlds/splits.py). Files, and recipes without chance, are one world in all of them.
         robots: Team size A.
         robot: How robots move.
-        sensor: What they sense.
+        sensor: What robots sense.
         extra_kinds: Further kinds of robots, for a mixed team: of K kinds in all, the first being `robot`
             with `sensor`, robot a is of kind a mod K. All share one form of action and observation
             (missions/action.py, missions/observation/layout.py).
-        start_radius_m: Robots start at most so far from where the first one does; inf = anywhere.
-        decision_period_s: A step lasts this long, 1e-3 to 1e5; None = until the next robot has to decide.
+        start_radius_m: Largest distance of a robot's start from that of the first one; inf = anywhere.
+        decision_period_s: Duration of a step, 1e-3 to 1e5; None = until the next robot has to decide.
         track_truth: Whether the team's joint map, of everything measured, is kept and compared with the
-            truth: for figures only, nobody acts on it. It costs one more map a mission. True by itself where
-            the ending asks for what was seen.
-        faults: What goes wrong with robots; nothing by default.
+            truth, for figures only. It costs one more map a mission. It is True where the ending asks for
+            what was seen.
+        faults: Failures of robots, sensors and radios; none by default.
         fiducials: Landmarks by which robots that drift correct what they believe of their poses
             (`Robot.localization`); none by default.
     """

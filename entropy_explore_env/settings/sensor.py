@@ -17,20 +17,20 @@ class RangeSensor:
 
     Attributes:
         field_of_view_rad: Full widths (yaw, pitch); (π/6, π/12) at π/90 gives 16 × 8 rays.
-        angular_step_rad: Between neighbouring rays.
+        angular_step_rad: Angle between neighbouring rays.
         max_range_m: Farthest return, 1e-6 to 1e6; inf = the workspace's boundary, which is a wall.
         sigma_min: Standard deviation of coverage right before the sensor (eq. 5).
-        sigma_slope_per_m: Its growth with the measured distance, ζ (eq. 5), 0 to 1e6; per mⁿ.
-        sigma_exponent: n, with which power of the distance it grows, 0.25 to 4: 1 as in eq. 5; 2 is that of
-            stereo cameras (Sujan, eq. 4).
+        sigma_slope_per_m: Growth of that standard deviation with the measured distance, ζ (eq. 5), 0 to 1e6;
+            per mⁿ.
+        sigma_exponent: Power n of the distance with which it grows, 0.25 to 4: 1 in eq. 5, 2 for stereo
+            cameras (Sujan, eq. 4).
         range_noise_m: Standard deviation of the measured distance, 0 to 1e6.
         voxels_behind: Voxels behind the hit that a ray still updates (as covered: eq. 4).
-        scan_time_s: A scan takes this long, 1e-4 to 1e5, standing still.
-        scan_every_m: A scan is also taken under way, whenever so much of the way is driven, 1e-3 to 1e6: the
-            robot drives on, and the scan takes no time. inf = only on arrival.
-        min_range_m: Nearest return, as of a depth camera that is blind close by: a return whose measured
-            distance is shorter brings no measurement, and nothing is learned along its ray. Of farther
-            returns, and of rays without one, all that the ray crossed is known to be free, also close by.
+        scan_time_s: Duration of a scan, standing still, 1e-4 to 1e5.
+        scan_every_m: Distance between scans under way, 1e-3 to 1e6, which take no time; inf = scans only on
+            arrival.
+        min_range_m: Nearest return, as of a depth camera that is blind close by. A nearer return brings no
+            measurement along its ray; farther ones measure all that they cross.
     """
 
     field_of_view_rad: tuple[float, float] = (math.pi / 6, math.pi / 12)
