@@ -124,15 +124,6 @@ def test_missing_peer_names_the_extra(measured, capsys, monkeypatch, module, pac
     assert package in err and "entropy_explore_env[bench]" in err
 
 
-def test_interruption_is_code_130_and_leaves_no_page(monkeypatch, capsys, tmp_path: Path):
-    def interrupt(effort: Effort) -> list[Row]:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(speed, "JOBS", {"sums": interrupt})
-    assert run("--out", str(tmp_path / "speed.md")) == 130
-    assert capsys.readouterr().out == "" and list(tmp_path.iterdir()) == []
-
-
 def test_ratio_is_the_median_of_the_rounds_ratios():
     row = compared("job", "peer", [10.0, 4.0, 6.0], [5.0, 1.0, 6.0], "steps/s", Goal("≥", 2.0))
     assert (row.ours, row.theirs, row.ratio, row.holds) == (6.0, 5.0, 2.0, True)
