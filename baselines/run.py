@@ -27,7 +27,7 @@ from baselines.cli.options import Mark
 from baselines.cli.progress import progress_bar
 from baselines.cli.task_options import TaskOptions, base_task, parsed_for, tasked
 from baselines.experiments.mission import run_mission, scripted_env
-from baselines.strategies import make_strategy, resolved
+from baselines.strategies import make_strategy, resolved, shown_name
 from baselines.strategies.table import help_text
 from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -80,7 +80,7 @@ def main(words: Sequence[str]) -> int:
     env = scripted_env(*tasked(task.scenario, args.task, args.robots), track_truth=True)
     wanted = Wanted(args.output, args.out, args.record)
     wanted.prepare()
-    title = f"{args.scenario}, {name}"
+    title = f"{args.scenario}, {shown_name(name)}"
     with MissionLog(wanted) as log, progress_bar(title, hidden=args.output.json) as show:
 
         def after_step(env: EntropyExploreEnv) -> None:

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from entropy_explore_env.reports.colours import robot_colour
-from entropy_explore_env.settings.grid import Grid
 
 COLOURS = tuple(tuple(level / 255 for level in robot_colour(robot)) for robot in range(8))
 """Of the robots, as in every other picture; colour-blind people can tell them apart."""
@@ -30,9 +29,3 @@ def png(figure: Figure, dots_per_inch: int = 110) -> bytes:
     picture = Image.open(drawn).convert("RGB").quantize(_PALETTE, dither=Image.Dither.NONE)
     picture.save(packed, format="png", optimize=True)
     return packed.getvalue()
-
-
-def extent_of(grid: Grid) -> tuple[float, float, float, float]:
-    """A workspace from above, in metres, as matplotlib's `imshow` wants it: left, right, bottom, top."""
-    low, size = grid.origin_m, grid.size_m
-    return float(low[0]), float(low[0] + size[0]), float(low[1]), float(low[1] + size[1])

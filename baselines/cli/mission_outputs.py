@@ -16,6 +16,7 @@ import numpy as np
 
 from baselines.cli.arguments import make_folder, print_json
 from baselines.cli.progress import named, print_table
+from baselines.strategies import shown_name
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.interop.bag_writer import BagWriter
@@ -225,7 +226,8 @@ class MissionLog:
         }
         content = {**figures, "settings": settings_of(recorder.missions.scenario), "series": series}
         write_atomically(folder / "mission.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
-        picture = mission_picture(recorder, named(figures), figures["strategy"], self._wanted.outputs.truth)
+        strategy = shown_name(figures["strategy"])
+        picture = mission_picture(recorder, named(figures), strategy, self._wanted.outputs.truth)
         write_atomically(folder / "mission.png", picture)
         team_map = joint_map(recorder.missions)
         name = "map.yaml" if team_map.grid.flat else "map.npz"

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
 
-from baselines.cli.figures import COLOURS, STYLE, extent_of, png
+from baselines.cli.figures import COLOURS, STYLE, png
 from entropy_explore_env.belief.elevation import elevation_map
 from entropy_explore_env.errors import counted
+from entropy_explore_env.picture_text import base_m
 from entropy_explore_env.reports.painting import entropy_share
-from entropy_explore_env.reports.recording import Recorder, believed_poses_now
+from entropy_explore_env.reports.projection import projections
+from entropy_explore_env.reports.recording import Recorder, believed_poses_now, stopped_now
 from entropy_explore_env.reports.rendering import estimate_outline
 from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.robot_kind import RobotKind
 
 _UNKNOWN = "#c9d6e8"
 _UNKNOWN_ABOVE = 0.9
@@ -32,33 +38,43 @@ _MARK_SIZE = 5
 
 
 class _Map(NamedTuple):
-    """A map of the workspace from above."""
+    """A map of the workspace from above, and of a volume also from the side."""
 
     values: np.ma.MaskedArray[Any, Any]
     """(X, Y); what is unknown is masked."""
     title: str
     label: str | None
-    """Of its colour bar; None = it has none."""
+    """Text at its colour bar; None: it has no colour bar."""
     colours: str
-    """Name of matplotlib's."""
+    """Name of matplotlib's colours."""
     scale: Normalize
-    """From values to shares of the way from the first colour to the last."""
+    """Maps values to shares of the way from the first colour to the last."""
     edge: str
-    """Colour of the edges of marks, which stand out on it."""
+    """Colour of the edges of marks, which stands out on it."""
+    side: np.ma.MaskedArray[Any, Any] | None = None
+    """(X, Z), the same from the side."""
+
+
+_COLUMN_INCHES, _WIDE_INCHES = 5.5, 4.8
+"""Width of a map's column, of two and of three columns."""
+_CURVES_INCHES, _LEGEND_INCHES = 3.3, 0.5
+_MAP_INCHES, _SIDE_INCHES = (1.6, 6.0), (0.9, 2.5)
+"""Least and largest height of a map from above, and of one from the side."""
+_AROUND_MAP_INCHES = 0.8
+"""Title and ticks of a map."""
 
 
 def mission_picture(recorder: Recorder, title: str, strategy: str, truth: bool = False) -> bytes:
-    """Entropy curves, shared measurements, and robot_0's map with all robots' paths.
+    """Draw entropy curves, shared measurements, and robot_0's map with all robots' paths.
 
-    Of a plan the map is drawn as it is, of a volume the layer from which the robots scanned most. Ground
-    below open sky, as that of terrains and cliffs, is seen from above: heights of the ground in place of
-    coverage. Where robots drift, the map is that of the frame in which they believe to be; the paths are
-    those that they truly drove, and each robot's estimate stands beside its true place, with an ellipse of
-    two standard deviations.
+    A plan is drawn as it is, a volume from above and from the side, projected along the line of sight. Ground
+    below open sky, as that of terrains and cliffs, is seen from above, by its heights. Where robots drift,
+    the map is that of the frame in which they believe to be; the paths are those that they truly drove, and
+    each robot's estimate stands beside its true place, with an ellipse of two standard deviations.
 
     Args:
-        recorder: Of a mission that has ended.
-        title: What it was: the scenario and its world.
+        recorder: Record of a mission that has ended.
+        title: The scenario and its world.
         strategy: Name of the strategy.
         truth: Whether the true world stands beside the map.
 
@@ -67,26 +83,37 @@ def mission_picture(recorder: Recorder, title: str, strategy: str, truth: bool =
     """
     missions = recorder.missions
     robots = missions.scenario.robots
-    known, coverage, true_world = _maps(recorder)
+    maps = _maps(recorder)[: 3 if truth else 2]
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(14.5, 7.4) if truth else (11, 7.4), layout="constrained")
-        if truth:
-            places = figure.subplot_mosaic("aaabbb;eeccww")
-            curves, shared, above, covered = (places[name] for name in "abec")
-            _draw_map(figure, places["w"], true_world, recorder, believed=False)
-        else:
-            curves, shared, above, covered = figure.subplots(2, 2).ravel()
-        _draw_entropies(curves, recorder)
+        figure, places = _page(missions.grid, len(maps), maps[0].side is not None)
+        _draw_entropies(places["entropy"], recorder)
         sent, label, of_what = _sent(recorder)
-        shared.step(recorder.time_s, sent, where="post", color="0.2")
-        shared.set(xlabel="simulated time (s)", ylabel=label, title=f"{of_what}, cumulative")
-        _draw_map(figure, above, known, recorder, believed=True)
-        _draw_map(figure, covered, coverage, recorder, believed=True)
+        places["sent"].step(recorder.time_s, sent, where="post", color="0.2")
+        places["sent"].set(xlabel="simulated time (s)", ylabel=label, title=f"{of_what}, cumulative")
+        for number, shown in enumerate(maps):
+            for up in (1,) if shown.side is None else (1, 2):
+                _draw_map(figure, places[f"{number}-{up}"], shown, recorder, number < 2, up)
         marks = _legend(recorder)
         figure.legend(handles=marks, loc="outside lower left", ncols=len(marks), frameon=False, fontsize=8)
         what = f"{title}, {strategy}, {counted(robots, 'robot')}, seed {missions.seeds[0]}"
         figure.suptitle(what, x=0.01, ha="left", fontsize=11)
         return png(figure)
+
+
+def _page(grid: Grid, maps: int, sides: bool) -> tuple[Figure, dict[str, Axes]]:
+    """Return a figure as high as its maps need, and its axes `entropy`, `sent`, `0-1`, `0-2`, … by name."""
+    column = _COLUMN_INCHES if maps == 2 else _WIDE_INCHES
+    length, width, height = grid.size_m
+    above = float(np.clip(0.8 * column * width / length, *_MAP_INCHES)) + _AROUND_MAP_INCHES
+    side = float(np.clip(0.8 * column * height / length, *_SIDE_INCHES)) + _AROUND_MAP_INCHES
+    heights = [_CURVES_INCHES, above, *([side] if sides else [])]
+    rows = [[name for name in ("entropy", "sent") for _ in range(3)]]
+    rows += [
+        [f"{number}-{up}" for number in range(maps) for _ in range(6 // maps)]
+        for up in ((1, 2) if sides else (1,))
+    ]
+    figure = Figure(figsize=(maps * column, sum(heights) + _LEGEND_INCHES), layout="constrained")
+    return figure, figure.subplot_mosaic(rows, height_ratios=heights)  # type: ignore[return-value]
 
 
 def _sent(recorder: Recorder) -> tuple[np.ndarray, str, str]:
@@ -118,30 +145,28 @@ def _draw_entropies(axes: Axes, recorder: Recorder) -> None:
 
 
 def _maps(recorder: Recorder) -> tuple[_Map, _Map, _Map]:
-    """What is left of the entropy of robot_0's map, what its map shows, and the true world."""
+    """Return what is left of the entropy of robot_0's map, what its map shows, and the true world."""
     missions, grid = recorder.missions, recorder.missions.grid
     solid = missions.state.truth[0].reshape(grid.shape) > 0.5
     heights = _open_ground(solid)
     if heights is not None:
         return _maps_from_above(recorder, grid.origin_m[2] + grid.voxel_size_m * heights)
-    layer = _busiest_layer(recorder.scan_positions_m, grid)
-    height_m = grid.centre_of(np.array([0, 0, layer]))[2]
-    where = "" if grid.flat else f"\nlayer at z = {height_m:.2f} m, paths at all heights"
-    share = entropy_share(missions, 0, 0)[:, :, layer]
-    cover = np.ma.masked_where(share > _UNKNOWN_ABOVE, missions.mean[0, 0][:, :, layer])
-    left, knows, unit = f"What robot_0 has left{where}", f"What robot_0 knows{where}", Normalize(0.0, 1.0)
-    return (
-        _Map(np.ma.masked_array(share), left, "share of the entropy left", "magma", unit, "white"),
-        _Map(cover, knows, "coverage; blue: unknown", "Greys", unit, "black"),
-        _Map(
-            np.ma.masked_array(solid[:, :, layer]),
-            f"The true world, black: solid{where}",
-            None,
-            "Greys",
-            unit,
-            "black",
-        ),
+    views = projections(entropy_share(missions, 0, 0), missions.mean[0, 0])
+    worlds = projections(np.zeros(grid.shape, np.float32), solid.astype(np.float32))
+    left = [np.ma.masked_array(view.entropy) for view in views]
+    known, true = ([np.ma.masked_less(view.coverage, 0.0) for view in each] for each in (views, worlds))
+    where = "" if grid.flat else ", from above and from the side"
+    unit = Normalize(0.0, 1.0)
+    described = (
+        (left, "What robot_0 has left", "share of the entropy left", "magma", "white"),
+        (known, "What robot_0 knows", "coverage; blue: unknown", "Greys", "black"),
+        (true, "The true world, black: solid", None, "Greys", "black"),
     )
+    first, second, third = (
+        _Map(values[0], title + where, label, colours, unit, edge, None if grid.flat else values[1])
+        for values, title, label, colours, edge in described
+    )
+    return first, second, third
 
 
 def _maps_from_above(recorder: Recorder, true_m: np.ndarray) -> tuple[_Map, _Map, _Map]:
@@ -185,59 +210,110 @@ def _open_ground(solid: np.ndarray) -> np.ndarray | None:
     return heights if ground and not overhangs else None
 
 
-def _draw_map(figure: Figure, axes: Axes, shown: _Map, recorder: Recorder, believed: bool) -> None:
-    """A map with the paths over it, and where robots are `believed` to be where they drift."""
+def _draw_map(figure: Figure, axes: Axes, shown: _Map, recorder: Recorder, believed: bool, up: int) -> None:
+    """Draw a map with the paths over it.
+
+    Args:
+        figure: The figure.
+        axes: Where to draw.
+        shown: The map.
+        recorder: Record of the mission.
+        believed: Whether to show where robots that drift believe to be.
+        up: The axis that points upwards: 1 = y, from above; 2 = z, from the side.
+    """
+    grid = recorder.missions.grid
+    values = shown.values if up == 1 or shown.side is None else shown.side
+    low_m, high_m = np.asarray(grid.origin_m), np.asarray(grid.origin_m) + grid.size_m
     image = axes.imshow(
-        shown.values.T,
+        values.T,
         origin="lower",
-        extent=extent_of(recorder.missions.grid),
+        extent=(low_m[0], high_m[0], low_m[up], high_m[up]),
         cmap=mpl.colormaps[shown.colours].with_extremes(bad=_UNKNOWN),
         norm=shown.scale,
-        aspect="equal",
+        aspect="equal" if up == 1 else "auto",
     )
-    axes.set(xlabel="x (m)", ylabel="y (m)")
-    axes.set_title(shown.title, fontsize=8)
-    if shown.label is not None:
-        figure.colorbar(image, ax=axes, shrink=0.7, label=shown.label)
-    fiducials_m = recorder.missions.state.fiducials[0]
-    axes.plot(*fiducials_m[:, :2].T, **_mark("^", "white", "black"))
+    for axis, name, number in ((axes.xaxis, "x", 0), (axes.yaxis, "yz"[up - 1], up)):
+        _write_metres(axis, name, low_m[number])
+    if up == 1:
+        axes.set_title(shown.title, fontsize=8)
+        if shown.label is not None:
+            figure.colorbar(image, ax=axes, shrink=0.7, label=shown.label)
+    over = [0, up]
+    axes.plot(*recorder.missions.state.fiducials[0][:, over].T, **_mark("^", "white", "black"))
     drifts = recorder.missions.estimates is not None
-    end = _mark("D", "none", shown.edge) if drifts else None
+    stopped = stopped_now(recorder.missions, 0)
     for robot, path_m in enumerate(recorder.paths_m):
         colour = COLOURS[robot % len(COLOURS)]
         thin = [withStroke(linewidth=1.7, foreground=shown.edge)]
-        axes.plot(path_m[:, 0], path_m[:, 1], color=colour, linewidth=0.9, path_effects=thin)
-        axes.plot(*path_m[0, :2], **_mark("o", colour, shown.edge))
-        axes.plot(*path_m[-1, :2], **(end or _mark("s", colour, shown.edge)))
+        axes.plot(*path_m[:, over].T, color=colour, linewidth=0.9, path_effects=thin)
+        axes.plot(*path_m[0, over], **_mark("o", colour, shown.edge))
+        end = ("D", "none") if drifts else (_end_of(recorder, robot), colour)
+        axes.plot(*path_m[-1, over], **_mark(*end, shown.edge))
+        if stopped[robot]:
+            axes.plot(*path_m[-1, over], **{**_mark("x", colour, "red"), "markersize": 2 * _MARK_SIZE})
     if believed:
-        _draw_estimates(axes, recorder, shown.edge)
+        _draw_estimates(axes, recorder, shown.edge, up)
 
 
-def _draw_estimates(axes: Axes, recorder: Recorder, edge: str) -> None:
-    """Where robots believe to be, with an ellipse and a line to the true place, if they do not know it."""
+def _write_metres(axis: Axis, name: str, low_m: float) -> None:
+    """Write metres along an axis, far from the frame's origin relative to a round number."""
+    from_m = base_m(low_m)
+    axis.set_major_locator(MaxNLocator(6))
+    axis.set_major_formatter(lambda metres, _: f"{metres - from_m:g}")
+    axis.set_label_text(f"{name} (m)" if from_m == 0.0 else f"{name} - {from_m:,.0f} (m)")
+
+
+_ENDS = ("s", "v", "P", "*")
+"""Marks of where robots ended, by their kinds."""
+
+
+def _end_of(recorder: Recorder, robot: int) -> str:
+    kinds = recorder.missions.scenario.kinds
+    return _ENDS[robot % len(kinds) % len(_ENDS)]
+
+
+def _draw_estimates(axes: Axes, recorder: Recorder, edge: str, up: int) -> None:
+    """Draw where robots believe to be, with an ellipse and a line to the true place, where they drift."""
     missions = recorder.missions
     if missions.estimates is None:
         return
     stroke = [withStroke(linewidth=3.0, foreground=edge)]
     for robot, pose in enumerate(believed_poses_now(missions, 0)):
         colour = COLOURS[robot % len(COLOURS)]
-        outline = estimate_outline(pose[:3], missions.estimates[0][robot]["covariance"][:3, :3], up=1)
+        outline = estimate_outline(pose[:3], missions.estimates[0][robot]["covariance"][:3, :3], up)
         to_truth = np.stack([pose[:3], recorder.paths_m[robot][-1]])
-        axes.plot(*pose[:2], **_mark("s", "none", edge))
+        axes.plot(*pose[[0, up]], **_mark(_end_of(recorder, robot), "none", edge))
         for line in (outline, to_truth):  # over the marks, which are hollow: an ellipse may be smaller
-            axes.plot(*line[:, :2].T, color=colour, linewidth=1.5, path_effects=stroke)
+            axes.plot(*line[:, [0, up]].T, color=colour, linewidth=1.5, path_effects=stroke)
 
 
 def _legend(recorder: Recorder) -> list[Line2D]:
-    """What the marks on the maps mean."""
-    drifts = recorder.missions.estimates is not None
-    meanings = {"o": "start", "s": "end"}
+    """Return what the marks on the maps mean."""
+    missions = recorder.missions
+    drifts, kinds = missions.estimates is not None, missions.scenario.kinds
+    ends = "end: where it believes to be, with an ellipse of 2 σ" if drifts else "end"
+    meanings = {"o": "start"}
+    for number in range(min(len(kinds), len(_ENDS))):
+        meanings[_ENDS[number]] = ends if len(kinds) == 1 else f"{ends}, {_kind_name(kinds, number)}"
     if drifts:
-        meanings |= {"s": "end: where it believes to be, with an ellipse of 2 σ", "D": "where it truly is"}
-    if recorder.missions.state.fiducials.shape[1]:
+        meanings["D"] = "where it truly is"
+    if stopped_now(missions, 0).any():
+        meanings["x"] = "stopped by a fault"
+    if missions.state.fiducials.shape[1]:
         meanings["^"] = "fiducial"
     inside = "none" if drifts else "white"
-    return [Line2D([], [], label=text, **_mark(mark, inside, "black")) for mark, text in meanings.items()]
+    edges = {"x": "red"}
+    return [
+        Line2D([], [], label=text, **_mark(mark, inside, edges.get(mark, "black")))
+        for mark, text in meanings.items()
+    ]
+
+
+def _kind_name(kinds: Sequence[RobotKind], number: int) -> str:
+    """Return what tells a kind of robot from the others: how it moves, if only it does so."""
+    motions = [kind.robot.motion for kind in kinds]
+    said = {"free": "flying robot", "planar": "ground robot"}[motions[number]]
+    return said if motions.count(motions[number]) == 1 else f"{said} of kind {number}"
 
 
 def _mark(marker: str, colour: Any, edge: str) -> dict[str, Any]:  # noqa: ANN401 - any of matplotlib's colours
@@ -249,9 +325,3 @@ def _mark(marker: str, colour: Any, edge: str) -> dict[str, Any]:  # noqa: ANN40
         "markersize": _MARK_SIZE,
         "linestyle": "",
     }
-
-
-def _busiest_layer(places_m: np.ndarray, grid: Grid) -> int:
-    """Index along z of the layer with the most scans."""
-    layers = grid.voxel_of(places_m.reshape(-1, 3))[:, 2]
-    return int(np.bincount(np.clip(layers, 0, grid.shape[2] - 1)).argmax())

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from baselines.strategies import shown_name
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.painting import remaining_share
 from entropy_explore_env.settings.changes import with_settings
@@ -159,7 +160,7 @@ def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario
     from rich.table import Table
 
     team = f"{figures['robots']} robot" + ("s" if figures["robots"] > 1 else "")
-    print(f"{named(figures)}, {figures['strategy']}, {team}, seed {figures['seed']}")
+    print(f"{named(figures)}, {shown_name(figures['strategy'])}, {team}, seed {figures['seed']}")
     table = Table(show_header=False)
     table.add_column(style="dim")
     table.add_column(justify="right")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType, ModuleType
@@ -71,6 +72,18 @@ def recommended(scenario: str) -> str:
 def resolved(name: str) -> str:
     """Return the name that records and tables hold of a strategy that is asked for by this name."""
     return ALIASES.get(name, str(home_path(name)) if name.startswith("~") else name)
+
+
+def shown_name(name: str) -> str:
+    """Return how people read a strategy's name: of `module:Class` and `file.py:Class` the class."""
+    return name if name.startswith(_PRETRAINED) else name.rpartition(":")[2]
+
+
+def shown_names(names: Iterable[str]) -> dict[str, str]:
+    """Return how a table calls its strategies: by `shown_name`, in full where two would be called alike."""
+    short = {name: shown_name(name) for name in names}
+    alike = Counter(short.values())
+    return {name: shown if alike[shown] == 1 else name for name, shown in short.items()}
 
 
 def strategy_module(name: str) -> str | Path:

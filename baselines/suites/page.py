@@ -14,6 +14,7 @@ from baselines.experiments.rows import Row as KeptRow
 from baselines.experiments.rows import origins_line, read_table, write_table
 from baselines.experiments.statistics import Interval
 from baselines.experiments.tables import markdown_table
+from baselines.strategies import shown_names
 from baselines.suites import SCOREBOARD, find_suite
 from baselines.suites.faults import CONDITIONS, LOST_ISOLATED, NOTHING_FAILS, Times, all_claims
 from baselines.suites.figures import fault_figure, task_figure
@@ -94,15 +95,17 @@ def overall_table(results: Results) -> str:
     measures = results.suite.measures
     head = ["strategy", "tasks", "missions", "finished"]
     head += [f"{measure.words}, over `{results.reference}`" for measure in measures]
+    overall = overall_rows(results)
+    names = shown_names(row["strategy"] for row in overall)
     rows = [
         [
-            f"`{row['strategy']}`",
+            f"`{names[row['strategy']]}`",
             row["tasks"],
             row["missions"],
             "-" if row["finished"] is None else f"{row['finished']:.0%}",
             *(shown(row[f"{measure.name}_ratio"], ".2f") for measure in measures),
         ]
-        for row in overall_rows(results)
+        for row in overall
     ]
     return markdown_table(head, rows)
 
@@ -123,9 +126,10 @@ def tasks_table(results: Results) -> str:
     head += [words for words, _ in _TASK_COLUMNS.values()]
     first, parts = measures[0].name, []
     all_rows = sorted(task_rows(results), key=lambda row: row[first])
+    names = shown_names({row["strategy"] for row in all_rows})
     for task in results.tasks:
         rows = [row for row in all_rows if row["task"] == task.name]
-        cells = [_task_cells(row, measures) for row in rows]
+        cells = [[f"`{names[row['strategy']]}`", *_task_cells(row, measures)] for row in rows]
         parts.append(f"**{task.name}**: {about(task)}\n\n{markdown_table(head, cells)}")
     return "\n".join(parts)
 
@@ -134,7 +138,7 @@ def _task_cells(row: Row, measures: Sequence[Measure]) -> list[str]:
     finished = f"{row['finished']} of {row['missions']}" + (
         f", {row['failed']} failed" if row["failed"] else ""
     )
-    cells = [f"`{row['strategy']}`", finished]
+    cells = [finished]
     for measure in measures:
         limit = row[f"{measure.name}_limit"]
         cut = row[measure.name].value >= limit
@@ -157,7 +161,8 @@ def failed_table(results: Results) -> str:
     for row in failed_rows(results):
         missions = f"{row['task']}: {', '.join(map(str, row['missions']))}"
         alike.setdefault((row["strategy"], row["reason"]), []).append(missions)
-    rows = [[f"`{name}`", "; ".join(where), _plain(reason)] for (name, reason), where in alike.items()]
+    names = shown_names({name for name, _ in alike})
+    rows = [[f"`{names[name]}`", "; ".join(where), _plain(reason)] for (name, reason), where in alike.items()]
     return markdown_table(["strategy", "tasks and missions", "reason"], rows) if rows else ""
 
 

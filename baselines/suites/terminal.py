@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from baselines.strategies import shown_name, shown_names
 from baselines.suites.page import shown, tasks_table
 from baselines.suites.results import Results, Row, failed_rows, overall_rows, task_rows
 
@@ -35,9 +36,9 @@ def show_results(results: Results, refused: Sequence[str], tables: bool) -> None
 
     measure, reference = results.suite.measures[0], results.reference
     own = results.suite.name == "own"
-    names = ", ".join(task.name for task in results.tasks) if own else results.suite.title
+    title = ", ".join(task.name for task in results.tasks) if own else results.suite.title
     table = Table(
-        title=f"{names}\nratios: over {reference}'s",
+        title=f"{title}\nratios: over {reference}'s",
         title_justify="left",
         box=box.SIMPLE_HEAD,
         padding=(0, 1, 0, 0),
@@ -47,9 +48,10 @@ def show_results(results: Results, refused: Sequence[str], tables: bool) -> None
     for head in ("missions", "finished", measure.words, "ms a\ndecision"):
         table.add_column(head, justify="right", no_wrap=True)
     rows = overall_rows(results)
+    names = shown_names(row["strategy"] for row in rows)
     for row in rows:
         table.add_row(
-            row["strategy"],
+            names[row["strategy"]],
             str(row["missions"]),
             "-" if row["finished"] is None else f"{row['finished']:.0%}",
             shown(row[f"{measure.name}_ratio"], ".2f"),
@@ -62,7 +64,8 @@ def show_results(results: Results, refused: Sequence[str], tables: bool) -> None
     for row in failed_rows(results):
         missions = ", ".join(map(str, row["missions"]))
         place = _place_of(results, row)
-        line = f"failed: {row['strategy']}, {row['task']}, missions {missions}: {row['reason']}{place}"
+        name = shown_name(row["strategy"])
+        line = f"failed: {name}, {row['task']}, missions {missions}: {row['reason']}{place}"
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     for reason in refused:
         console.print(f"refused: {reason}", markup=False, highlight=False, soft_wrap=True)

@@ -71,16 +71,21 @@ _WHOSE = {
 """Ending.termination → by whose map a mission ends."""
 
 
+_FIRST = ("office", "cave", "terrain")
+"""Scenarios that the gallery begins with."""
+
+
 def gallery() -> str:
-    """The page that shows all scenarios."""
+    """Return the page that shows all scenarios."""
+    names = [*_FIRST, *(name for name in SCENARIOS if name not in _FIRST)]
     rows = [
         [
             f"[![{name}]({name}.png)]({name}.md)",
             f"[{name}]({name}.md), `{environment_id(name)}`<br>{_about(name)}",
         ]
-        for name in SCENARIOS
+        for name in names
     ]
-    pages = "\n".join(SCENARIOS)
+    pages = "\n".join(names)
     return f"""# Scenario cards
 
 A scenario is a task: a kind of world, a team, what it may do, and when it is over. Each has an id for

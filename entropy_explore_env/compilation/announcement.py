@@ -36,6 +36,11 @@ def compiled_kernels() -> tuple[str, ...]:
     return tuple(_progress.compiled)
 
 
+def compiling_s() -> float:
+    """Return the seconds that this process has spent on compiling so far."""
+    return _progress.spent_s
+
+
 @contextmanager
 def compiling(name: str, folder: Path | None) -> Iterator[None]:
     """Note a kernel that Python calls while it is compiled; the first one is announced."""

@@ -41,6 +41,7 @@ class Mark(enum.Enum):
     ESTIMATE = "pose estimate, 2 sigma"
     TRUE_PLACE = "where it truly is"
     FIDUCIAL = "fiducial"
+    STOPPED = "stopped by a fault"
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,18 @@ def draw_disc(draw: ImageDraw.ImageDraw, centre: tuple[float, float], radius: fl
     draw.ellipse(_around(centre, radius), colour)
 
 
+def draw_robot(
+    draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: int, colour: Colour, kind: int
+) -> None:
+    """Draw a robot: a disc if it is of the first kind, else a polygon with kind + 3 corners."""
+    radius = MARK_RADIUS * unit
+    if kind == 0:
+        draw_disc(draw, centre, radius, colour)
+        return
+    draw.polygon(_corners(centre, radius + 2, kind + 3), INK)
+    draw.polygon(_corners(centre, radius + 1, kind + 3), colour)
+
+
 def draw_ring(
     draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: int, colour: Colour | None = None
 ) -> None:
@@ -96,10 +109,12 @@ def draw_ring(
     draw.ellipse(_around(centre, radius), outline=colour, width=2 * unit)
 
 
-def draw_cross(draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: int) -> None:
-    """Draw the mark over a robot that has stopped: a dark cross, larger than the robot's disc."""
+def draw_cross(
+    draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: int, radius: int = MARK_RADIUS + 3
+) -> None:
+    """Draw the mark over a robot that has stopped: a dark cross, by default larger than the robot's disc."""
     x, y = centre
-    arm = (MARK_RADIUS + 3) * unit
+    arm = radius * unit
     for side in (-1, 1):
         draw.line((x - arm, y - side * arm, x + arm, y + side * arm), INK, 2 * unit)
 
@@ -206,13 +221,15 @@ def legend_rows(robots: int, marks: tuple[Mark, ...]) -> int:
     return (min(robots, len(ROBOT_COLOURS)) + 1) // 2 + len(marks)
 
 
-def draw_legend(draw: ImageDraw.ImageDraw, box: Box, robots: int, marks: tuple[Mark, ...], unit: int) -> None:
-    """Draw the colours of the robots, two in a row, and what the marks mean."""
+def draw_legend(
+    draw: ImageDraw.ImageDraw, box: Box, robots: int, marks: tuple[Mark, ...], unit: int, kinds: int = 1
+) -> None:
+    """Draw the colours of the robots, two in a row, and what the marks mean; robot a is of kind a mod K."""
     shown, inset = min(robots, len(ROBOT_COLOURS)), (MARK_RADIUS + 1) * unit
     for robot in range(shown):
         left = box.left + robot % 2 * box.width // 2
         middle = box.top + (robot // 2 + 0.5) * LINE_HEIGHT * unit
-        draw_disc(draw, (left + inset, middle), MARK_RADIUS * unit, robot_colour(robot))
+        draw_robot(draw, (left + inset, middle), unit, robot_colour(robot), robot % kinds)
         more = ", …" if robot + shown < robots else ""
         write(draw, (left + 2 * inset + 4 * unit, middle), f"robot {robot}{more}", TEXT_SIZE * unit, "lm")
     for row, mark in enumerate(marks, start=legend_rows(robots, ())):
@@ -229,6 +246,8 @@ def _draw_mark(draw: ImageDraw.ImageDraw, mark: Mark, place: tuple[float, float]
         draw_diamond(draw, place, unit)
     elif mark is Mark.FIDUCIAL:
         draw_triangle(draw, place, unit)
+    elif mark is Mark.STOPPED:
+        draw_cross(draw, place, unit, MARK_RADIUS)
     else:
         x, y, wide, high = *place, (MARK_RADIUS + 1) * unit, (MARK_RADIUS - 1) * unit
         draw.ellipse((x - wide, y - high, x + wide, y + high), outline=INK, width=2 * unit)

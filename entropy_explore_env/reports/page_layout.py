@@ -106,6 +106,7 @@ def lay_out(
     lines: int,
     width: int,
     height: int,
+    kinds: int = 1,
 ) -> PageLayout:
     """Arrange maps, curves, legend and status, and draw what does not change.
 
@@ -117,6 +118,7 @@ def lay_out(
         lines: Number of status lines.
         width: Of the picture in pixels.
         height: Of the picture in pixels.
+        kinds: Kinds of robots in the team.
     """
     unit = max(1, min(width // 560, height // 420))
     named = legend_rows(robots, marks)
@@ -136,7 +138,7 @@ def lay_out(
     for quantity in ("entropy", "coverage"):
         lowest = [view for view in best.views if view.quantity == quantity][-1]
         draw_key(page, quantity, lowest, unit, best.scale / voxel_size_m if quantity == "entropy" else None)
-    draw_legend(draw, legend, robots, marks, unit)
+    draw_legend(draw, legend, robots, marks, unit, kinds)
     draw_axes(draw, curves, unit)
     return PageLayout(unit, best.views, curves, status, page)
 

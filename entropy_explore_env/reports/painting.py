@@ -9,12 +9,11 @@ import numpy as np
 from gymnasium import logger
 
 from entropy_explore_env.errors import CallOrderError, SettingError, did_you_mean
-from entropy_explore_env.missions.faults import failing
 from entropy_explore_env.missions.localization import pose_errors
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.animation import Window
 from entropy_explore_env.reports.projection import shares_left
-from entropy_explore_env.reports.recording import DrivenPaths, believed_poses_now, poses_now
+from entropy_explore_env.reports.recording import DrivenPaths, believed_poses_now, poses_now, stopped_now
 from entropy_explore_env.reports.rendering import Frame, draw_frame
 from entropy_explore_env.worlds.given import GIVEN
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
@@ -128,9 +127,7 @@ class Painter:
         poses = believed_poses_now(missions, self._number)
         drifts, estimates = missions.scenario.drifts, missions.state.estimates[self._number]
         shares = np.stack(self._shares) if self._shares else np.zeros((0, len(robots)))
-        stopped = np.zeros(len(robots), bool)
-        if missions.scenario.faults.happen:
-            stopped = failing(missions.state.faults[self._number], time_s)["stopped"]
+        stopped = stopped_now(missions, self._number)
         summaries = missions.scenario.channel.content == "summaries"
         sent = ("bits", "bits_sent") if summaries else ("rays", "measurements_sent")
         status = (
@@ -156,6 +153,7 @@ class Painter:
             title=f"{world_name(missions, self._number)}: belief of robot_0",
             status=status,
             stopped=tuple(np.flatnonzero(stopped).tolist()),
+            kinds=len(missions.scenario.kinds),
             covariances_m2=estimates["covariance"][:, :3, :3],
             true_m=poses_now(missions, self._number)[:, :3] if drifts else np.zeros((0, 3)),
             fiducials_m=missions.state.fiducials[self._number],

@@ -21,9 +21,9 @@ from entropy_explore_env.reports.annotations import (
     Mark,
     draw_cross,
     draw_diamond,
-    draw_disc,
     draw_edged_line,
     draw_ring,
+    draw_robot,
     draw_triangle,
     write,
 )
@@ -62,6 +62,7 @@ class Frame:
         title: One line.
         status: Lines such as "time 123 s"; at most eight are drawn.
         stopped: Numbers of robots that a fault has stopped: a cross is drawn over them.
+        kinds: K kinds of robots in the team, which differ in shape; robot a is of kind a mod K.
         covariances_m2: (A, 3, 3), of positions that are estimates: an ellipse of two standard deviations is
             drawn around each; (0, 3, 3) = none are.
         true_m: (A, 3), where the robots truly are then: a line leads there; (0, 3) = none is drawn.
@@ -81,6 +82,7 @@ class Frame:
     title: str
     status: tuple[str, ...] = ()
     stopped: tuple[int, ...] = ()
+    kinds: int = 1
     covariances_m2: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 3)))
     true_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     fiducials_m: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
@@ -118,6 +120,7 @@ class Frame:
             Mark.ESTIMATE: len(self.covariances_m2) > 0,
             Mark.TRUE_PLACE: len(self.true_m) > 0,
             Mark.FIDUCIAL: len(self.fiducials_m) > 0,
+            Mark.STOPPED: len(self.stopped) > 0,
         }
         return tuple(mark for mark, there in shown.items() if there)
 
@@ -145,7 +148,8 @@ def draw_frame(frame: Frame, width: int = 640, height: int = 480) -> np.ndarray:
             raise SettingError(name, value, f"at least {least} pixels")
     status = frame.status[:_STATUS_LINES]
     shape, robots = np.shape(frame.entropy_share), len(frame.positions_m)
-    layout = lay_out(shape, float(frame.voxel_size_m), robots, frame.marks, len(status), width, height)
+    page_size, lines = (width, height), len(status)
+    layout = lay_out(shape, float(frame.voxel_size_m), robots, frame.marks, lines, *page_size, frame.kinds)
     page, unit = layout.page.copy(), layout.unit
     draw = ImageDraw.Draw(page)
     _write_title(draw, frame.title, width - 2 * MARGIN * unit, unit)
@@ -222,7 +226,7 @@ def _draw_robots(picture: Image.Image, view: View, frame: Frame, unit: int) -> N
         if np.isfinite(x + y + dx + dy):
             draw.line((x, y, x + 1.1 * dx, y + 1.1 * dy), INK, 2 * unit + 3)
             draw.line((x, y, x + dx, y + dy), robot_colour(robot), 2 * unit + 1)
-            draw_disc(draw, (x, y), MARK_RADIUS * unit, robot_colour(robot))
+            draw_robot(draw, (x, y), unit, robot_colour(robot), robot % frame.kinds)
             if robot in frame.stopped:
                 draw_cross(draw, (x, y), unit)
     for robot, true_m in enumerate(frame.true_m):

@@ -20,7 +20,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
-from entropy_explore_env.picture_text import font, shortened, text_width
+from entropy_explore_env.picture_text import base_m, font, shortened, text_width
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World, box_around, part_of
 
@@ -254,16 +254,20 @@ def _panel(view: _View, pixels_a_voxel: float) -> Image.Image:
 def _draw_ticks(draw: ImageDraw.ImageDraw, axes: _Axes, corner_m: tuple[float, float]) -> None:
     """Ticks with metres of the world's frame below and left of a view."""
     right, bottom = axes.left + axes.width, axes.top + axes.height
+    bases_m = [base_m(corner) for corner in corner_m]
     for metres in _ticks(corner_m[0], axes.width / axes.across, _round_step(90.0 / axes.across)):
         x = axes.left + (metres - corner_m[0]) * axes.across
         draw.line((x, bottom, x, bottom + 6), _INK)
-        draw.text((x, bottom + 8), f"{metres:.10g}", _INK, font(_TEXT_SIZE), anchor="ma")
+        draw.text((x, bottom + 8), f"{metres - bases_m[0]:.10g}", _INK, font(_TEXT_SIZE), anchor="ma")
     draw.text((right + 10, bottom - 12), "m", _INK, font(_TEXT_SIZE))
+    if any(bases_m):
+        said = f"metres from ({bases_m[0]:,.0f}, {bases_m[1]:,.0f})"
+        draw.text((right, axes.top - 22), said, _INK, font(_TEXT_SIZE), anchor="ra")
     spacing = min(90.0, max(20.0, axes.height / 2.5))
     for metres in _ticks(corner_m[1], axes.height / axes.upwards, _round_step(spacing / axes.upwards)):
         y = bottom - (metres - corner_m[1]) * axes.upwards
         draw.line((axes.left - 6, y, axes.left, y), _INK)
-        draw.text((axes.left - 9, y), f"{metres:.10g}", _INK, font(_TEXT_SIZE), anchor="rm")
+        draw.text((axes.left - 9, y), f"{metres - bases_m[1]:.10g}", _INK, font(_TEXT_SIZE), anchor="rm")
 
 
 def _round_step(least: float) -> float:

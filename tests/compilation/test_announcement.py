@@ -39,6 +39,15 @@ def test_one_line_before_and_one_after(caplog):
     }
 
 
+def test_seconds_of_compiling_are_counted(monkeypatch):
+    clock = iter([10.0, 12.0])
+    monkeypatch.setattr(announcement.time, "perf_counter", lambda: next(clock))
+    assert announcement.compiling_s() == 0.0
+    with announcement.compiling("step", None):
+        pass
+    assert announcement.compiling_s() == 2.0
+
+
 def test_nothing_is_said_when_all_comes_from_disk(caplog):
     announcement.end_of_step()
     assert not caplog.records and announcement.compiled_kernels() == ()

@@ -383,7 +383,8 @@ def test_the_legend_explains_what_is_marked_and_nothing_else(monkeypatch: pytest
     drifting = dataclasses.replace(
         frame, covariances_m2=np.zeros((3, 3, 3)), true_m=frame.positions_m, fiducials_m=np.zeros((4, 3))
     )
-    assert drifting.marks == tuple(Mark)
+    assert drifting.marks == tuple(mark for mark in Mark if mark is not Mark.STOPPED)
+    assert dataclasses.replace(drifting, stopped=(1,)).marks == tuple(Mark)
     written: dict[str, float] = {}
     monkeypatch.setattr(annotations, "write", lambda _, place, text, *__: written.update({text: place[1]}))
     for marks in (PLAIN, tuple(Mark)):

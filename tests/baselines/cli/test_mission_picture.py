@@ -12,6 +12,8 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.recording import Recorder, believed_poses_now, poses_now
 from entropy_explore_env.settings.fiducials import Fiducials
 from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box, random_actions, started
 
@@ -129,11 +131,48 @@ def test_ground_below_open_sky_is_shown_from_above(drawn):
         pytest.param(lambda solid: solid[:, 1:].fill(True), id="walls to the roof"),
     ],
 )
-def test_what_is_no_open_ground_is_cut_at_a_layer(change):
+def test_what_is_no_open_ground_is_projected(change):
     solid = np.arange(5) < np.random.default_rng(2).integers(1, 4, (7, 11, 1))
     np.testing.assert_array_equal(pictures._open_ground(solid), solid.sum(axis=2))
     change(solid)
     assert pictures._open_ground(solid) is None
+
+
+def test_a_volume_is_shown_from_above_and_from_the_side_at_all_heights(drawn):
+    """A slab at each height hides nothing of the others: both appear in the view from the side."""
+    solid = np.zeros((7, 11, 5), bool)
+    solid[1, :, 1] = solid[4, :, 3] = True
+    missions = Missions(free_box(robots=1, grid=GRID, world="given"), given=[World(GRID, solid, "shelves")])
+    missions.reset(0, 0)
+    missions.state.mean[0, 0], missions.state.precision[0, 0] = solid.ravel(), 1e6
+    recorder = Recorder(missions)
+    recorder.note()
+    mission_picture(recorder, "shelves", "random", truth=True)
+    sides = [axes for axes in drawn[0].axes if axes.images and axes.get_ylabel().startswith("z")]
+    assert len(sides) == 3 and len(panels_of(drawn[0])) == 3
+    for axes in sides[1:]:
+        seen = np.ma.asarray(axes.images[0].get_array()).T
+        assert sorted(map(tuple, np.argwhere(seen > 0.9))) == [(1, 1), (4, 3)]
+        assert axes.images[0].get_extent() == [-2.0, 1.5, 0.25, 2.75]
+
+
+def test_kinds_differ_in_their_marks_and_who_stopped_is_crossed_out(drawn):
+    kinds = (RobotKind(Robot(motion="planar", sensor_height_m=1.0)),)
+    faults = {"stop": {"at_s": 0.5, "robots": (1,)}}
+    scenario = free_box(robots=3, grid=GRID, extra_kinds=kinds, faults=faults)
+    mission_picture(recorded(started(scenario)), "box", "random")
+    labels = [text.get_text() for text in drawn[0].legends[0].texts]
+    assert labels == ["start", "end, flying robot", "end, ground robot", "stopped by a fault"]
+    axes = panels_of(drawn[0])[0]
+    assert [len(marks(axes, mark)) for mark in "svx"] == [2, 1, 1]
+
+
+def test_coordinates_of_utm_are_written_from_a_round_number(drawn):
+    far = Grid((7, 11, 1), 0.5, (448_262.0, 5_411_932.5, 0.0))
+    mission_picture(recorded(started(free_box(robots=1, grid=far))), "box", "random")
+    axes = panels_of(drawn[0])[0]
+    assert axes.get_xlabel() == "x - 448,000 (m)" and axes.get_ylabel() == "y - 5,411,000 (m)"
+    assert axes.yaxis.get_major_formatter()(5_411_934.5, 0) == "934.5"
 
 
 def test_a_plan_is_no_open_ground():
