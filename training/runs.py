@@ -19,7 +19,7 @@ from stable_baselines3 import PPO
 from baselines.cli.arguments import parse
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.settings.json import dataclass_of, json_of
+from entropy_explore_env.settings.json import dataclass_of, settings_of
 from entropy_explore_env.settings.validation import check_whole, is_whole
 from entropy_explore_env.writing import write_atomically
 from training.advantages import DecisionBuffer, Normaliser
@@ -85,7 +85,7 @@ def options_json(args: Any) -> dict[str, Any]:  # noqa: ANN401 - a dataclass of 
     """The options of a command as JSON holds them, without those that say where the run is."""
     fields = {each.name: getattr(args, each.name) for each in dataclasses.fields(args)}
     return {
-        name: str(value) if isinstance(value, Path) else json_of(value)
+        name: str(value) if isinstance(value, Path) else settings_of(value)
         for name, value in fields.items()
         if name not in OF_THE_CALL
     }

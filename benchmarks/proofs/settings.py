@@ -12,7 +12,7 @@ from benchmarks.proofs.drawn_scenarios import draw_scenario
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import EntropyExploreError, RecordError
 from entropy_explore_env.missions.state_ranges import check_ranges
-from entropy_explore_env.settings.json import settings_json
+from entropy_explore_env.settings.json import settings_of
 
 STEPS = 50
 WATCHDOG_S = 20.0
@@ -40,7 +40,7 @@ def play(number: int) -> Found:
             continue
         seconds, episodes = _play(env, rng, number)
         if seconds > WATCHDOG_S:
-            raise BrokenPromiseError(f"{STEPS} steps took {seconds:.1f} s: {settings_json(drawn.scenario)}")
+            raise BrokenPromiseError(f"{STEPS} steps took {seconds:.1f} s: {settings_of(drawn.scenario)}")
         return Found({"episodes": episodes, "scenarios refused before": refused, "s at most": seconds})
     raise BrokenPromiseError(f"none of {_MOST_DRAWS} drawn scenarios was allowed")
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import json
 import math
 import types
 import typing
@@ -21,29 +20,27 @@ INFINITY = "inf"
 """JSON has no infinity; where a number belongs, this text stands for it."""
 
 
-def settings_of(scenario: Scenario) -> dict[str, Any]:
-    """Return a scenario's settings as what JSON holds: objects, lists, texts, numbers, true, false and null.
+def settings_of(value: Any) -> Any:  # noqa: ANN401 - a dataclass, or what one may hold
+    """Return settings as what JSON holds: objects, lists, texts, numbers, true, false and null.
 
-    `scenario_of` gives the same scenario back, also after `json.dumps` and `json.loads`.
+    `scenario_of` and `dataclass_of` give the same settings back, also after `json.dumps` and `json.loads`.
     """
-    return _encoded(scenario)
+    if dataclasses.is_dataclass(value):
+        return {field.name: settings_of(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, tuple):
+        return [settings_of(each) for each in value]
+    if isinstance(value, np.generic):
+        return settings_of(value.item())
+    return INFINITY if isinstance(value, float) and value == math.inf else value
 
 
-def scenario_of(settings: Mapping[str, Any]) -> Scenario:
-    """Return the scenario with these settings.
-
-    Args:
-        settings: As `settings_of` gives them. What is missing has its default, if it has one.
+def scenario_of(settings: Any) -> Scenario:  # noqa: ANN401 - whatever a file holds
+    """Return the scenario with these settings; what is missing has its default, if it has one.
 
     Raises:
         SettingError: A setting is unknown, missing, of the wrong kind or out of its range.
     """
-    return _decoded(Scenario, settings, "settings")
-
-
-def json_of(settings: Any) -> Any:  # noqa: ANN401 - a dataclass, or what one may hold
-    """Return the settings of any dataclass as what JSON holds; `dataclass_of` gives the same back."""
-    return _encoded(settings)
+    return dataclass_of(Scenario, settings)
 
 
 def dataclass_of(kind: type[Settings], settings: Any, name: str = "settings") -> Settings:  # noqa: ANN401
@@ -51,41 +48,13 @@ def dataclass_of(kind: type[Settings], settings: Any, name: str = "settings") ->
 
     Args:
         kind: The dataclass.
-        settings: As `json_of` gives them; what is missing has its default.
-        name: Of the settings, for errors.
+        settings: As `settings_of` gives them; what is missing has its default.
+        name: Name of the settings, for errors.
 
     Raises:
         SettingError: See `scenario_of`.
     """
     return _decoded(kind, settings, name)
-
-
-def settings_json(scenario: Scenario) -> str:
-    """Return a scenario's settings as the text of one JSON object."""
-    return json.dumps(settings_of(scenario), allow_nan=False)
-
-
-def scenario_from_json(text: str) -> Scenario:
-    """Return the scenario that `settings_json` wrote.
-
-    Raises:
-        SettingError: The text is not JSON, or see `scenario_of`.
-    """
-    try:
-        settings = json.loads(text)
-    except (ValueError, RecursionError):
-        raise SettingError("settings", text, "the text of a JSON object") from None
-    return scenario_of(settings)
-
-
-def _encoded(value: Any) -> Any:  # noqa: ANN401 - whatever a setting may be
-    if dataclasses.is_dataclass(value):
-        return {field.name: _encoded(getattr(value, field.name)) for field in dataclasses.fields(value)}
-    if isinstance(value, tuple):
-        return [_encoded(each) for each in value]
-    if isinstance(value, np.generic):
-        return _encoded(value.item())
-    return INFINITY if isinstance(value, float) and value == math.inf else value
 
 
 def _decoded(hint: Any, value: Any, name: str) -> Any:  # noqa: ANN401 - whatever a setting may be

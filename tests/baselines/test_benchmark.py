@@ -30,7 +30,7 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.settings.json import settings_json
+from entropy_explore_env.settings.json import settings_of
 from entropy_explore_env.settings.scenarios import BOX, LAB, SCENARIOS
 from entropy_explore_env.worlds.load import FORMATS, save_world
 from entropy_explore_env.worlds.world import World
@@ -427,7 +427,7 @@ def test_a_settings_file_and_flags_change_what_is_compared(tmp_path, capsys):
         files.append(str(tmp_path / name / "plan.png"))
         Image.fromarray(pixels[: 30 if name == "a" else 25]).save(files[-1])
     mine = with_settings(SCENARIOS["office"], {"name": "mine", "robots": 1, "time_limit_s": 15.0})
-    (tmp_path / "mine.json").write_text(settings_json(mine))
+    (tmp_path / "mine.json").write_text(json.dumps(settings_of(mine)))
     usual = ["--strategies", "random", "--seeds", "2", "--jobs", "1", "--json"]
     words = ["--settings", str(tmp_path / "mine.json"), "--world", *files, "--robot.reach-m", "2"]
     assert run_command(benchmark.main, [*usual, *words, "--out", str(tmp_path / "out")]) == 0
@@ -456,7 +456,7 @@ def test_a_settings_file_and_flags_change_what_is_compared(tmp_path, capsys):
     ],
 )
 def test_options_that_contradict_each_other_are_named(words, named, tmp_path, monkeypatch, capsys):
-    (tmp_path / "mine.json").write_text(settings_json(BOX))
+    (tmp_path / "mine.json").write_text(json.dumps(settings_of(BOX)))
     monkeypatch.chdir(tmp_path)
     assert run_command(benchmark.main, [*words, "--out", "out"]) == 2
     assert capsys.readouterr().err.startswith(f"error: {named} = ") and not (tmp_path / "out").exists()

@@ -24,7 +24,7 @@ from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.robots.channel import BITS_PER_BATCH, BITS_PER_COVARIANCE, BITS_PER_MEASUREMENT
 from entropy_explore_env.settings.changes import with_settings
-from entropy_explore_env.settings.json import scenario_from_json, settings_json
+from entropy_explore_env.settings.json import scenario_of, settings_of
 from entropy_explore_env.settings.localization import Localization
 from entropy_explore_env.worlds.load import make_world
 from entropy_explore_env.worlds.world import World
@@ -373,7 +373,7 @@ def test_fiducials_where_none_can_be_are_refused_before_anything_changes():
 def test_settings_go_through_json_and_exact_robots_cost_nothing():
     fiducials = {"positions_m": ((1.0, 1.0, 1.0), (0.5, 2.0, 0.25)), "range_m": 4.0}
     scenario = free_box(fiducials=fiducials, **DRIFTING)
-    assert scenario_from_json(settings_json(scenario)) == scenario and scenario.drifts
+    assert scenario_of(settings_of(scenario)) == scenario and scenario.drifts
     exact = free_box(fiducials=fiducials)
     assert not exact.drifts and not Localization().drifts
     missions = started(exact)

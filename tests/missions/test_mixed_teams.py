@@ -19,7 +19,7 @@ from entropy_explore_env.reports.metrics import information_floor
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.settings.json import scenario_from_json, settings_json
+from entropy_explore_env.settings.json import scenario_of, settings_of
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenarios import OFFICE_3D, OFFICE_MIXED
@@ -302,7 +302,7 @@ def test_many_missions_threads_and_copies_agree():
 
 
 def test_settings_of_a_mixed_team_survive_json():
-    assert scenario_from_json(settings_json(OFFICE_MIXED)) == OFFICE_MIXED
+    assert scenario_of(settings_of(OFFICE_MIXED)) == OFFICE_MIXED
     assert OFFICE_MIXED.kind_of(1).robot == OFFICE_3D.robot
 
 

@@ -10,7 +10,7 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.channel import Signal
 from entropy_explore_env.settings.faults import Faults, Outage, RadioFault, SensorFault
-from entropy_explore_env.settings.json import scenario_from_json, settings_json
+from entropy_explore_env.settings.json import scenario_of, settings_of
 from entropy_explore_env.settings.scenarios import BOX
 
 TEAM = with_settings(BOX, {"robots": 3})
@@ -64,8 +64,8 @@ def test_they_go_through_json_without_loss():
     scenario = with_settings(
         TEAM, {"faults": faults, "channel": channel, "ending": {"termination": "shared"}}
     )
-    again = scenario_from_json(settings_json(scenario))
+    again = scenario_of(settings_of(scenario))
     assert again == scenario and again.faults == faults
     assert again.channel.signal == Signal(exponent=3.0, budget_db=55.0)
     bare = dataclasses.replace(scenario, faults=Faults())
-    assert bare != scenario and scenario_from_json(settings_json(bare)) == bare
+    assert bare != scenario and scenario_of(settings_of(bare)) == bare

@@ -12,7 +12,7 @@ from baselines.cli.arguments import run_command
 from baselines.experiments.rows import read_table
 from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.settings.changes import with_settings
-from entropy_explore_env.settings.json import settings_json
+from entropy_explore_env.settings.json import settings_of
 from entropy_explore_env.settings.scenarios import BOX
 from training import evaluate, ppo
 from training.checkpoints import latest_checkpoint, load_checkpoint
@@ -86,7 +86,7 @@ def test_a_policy_that_observes_the_whole_map_is_validated_in_plans_of_its_size(
 def test_what_a_settings_file_says_is_learned_and_kept(tmp_path, capsys):
     """A scenario of its own: team, time limit and cost of a second are the file's, not training's."""
     changes = {"name": "mine", "robots": 1, "time_limit_s": 12.0, "reward": {"cost_per_s": 0.5}}
-    (tmp_path / "mine.json").write_text(settings_json(with_settings(BOX, changes)))
+    (tmp_path / "mine.json").write_text(json.dumps(settings_of(with_settings(BOX, changes))))
     words = " ".join(TINY)
     for gone in ("--scenario office ", "--robots 1 ", "--time-limit-s 20 "):
         words = words.replace(gone, "")
