@@ -100,7 +100,11 @@ MISSION = ranged_type(
             (5,),
         ),  # when the share of SEEN_MARKS of what is visible was explored; -1 = not yet
         ("seen_m", "f8", Values(-ROUNDING, MOST, -1.0), (5,)),  # what the team had driven then; -1 likewise
-        ("explored_end", "i8", _VOXELS),  # so many explored visible voxels end the mission, if so it ends,
+        (
+            "explored_end",
+            "i8",
+            Values(0, MAX_VOXELS),
+        ),  # so many explored visible voxels end the mission, if so it ends,
         ("explored_free_end", "i8", Values(-MAX_VOXELS, "voxels")),  # and so many free ones
         # since a scan showed something new, or since it was asked what is left:
         ("idle_scans", "i8", COUNT),  # the team's scans

@@ -16,6 +16,7 @@ from entropy_explore_env.missions.memory import Batch, check_memory
 from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.reset_options import DRAWN, ResetOptions
+from entropy_explore_env.missions.returning import Returning
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.state import FROM_WORLD, MissionState, new_state
 from entropy_explore_env.missions.state_ranges import check_ranges
@@ -95,6 +96,7 @@ class Missions:
         self.options = [DRAWN] * self.count
         self.every_reset = DRAWN
         self.reward_function = ""
+        self._returning = Returning(self.count, scenario.robots) if scenario.ending.return_to_start else None
         self.seeds = [0] * self.count
         self.episodes = [-1] * self.count
         self.observations = np.zeros((self.count, scenario.robots, self.layout.size), np.float32)
@@ -205,6 +207,8 @@ class Missions:
             self.state.truth[mission] = true_coverage(world.occupied, world.unreadable)
             self._set_collision_masks(mission, world)
         fill_start(self.scenario, self.rules, self.state, start)
+        if self._returning is not None:
+            self._returning.begin(self.state, mission, self.grid.voxels)
         self._compiled_step.observe(self._arrays(), mission, mission + 1)
 
     def _arrays(self) -> Arrays:
@@ -256,6 +260,8 @@ class Missions:
         if self._compiled_step.proposes:
             continuous = self._chosen_viewpoints(discrete)
         self._compiled_step.step(self._arrays(), continuous, discrete)
+        if self._returning is not None:
+            self._returning.end(self.rules, self.state)
         end_of_step()
         return self.observations
 

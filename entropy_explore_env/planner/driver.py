@@ -78,6 +78,8 @@ class Trail:
     """Decisions for which it still backs off."""
     stood_at: np.ndarray = field(default_factory=lambda: np.full(3, np.inf))
     stands: int = 0
+    home: np.ndarray = field(default_factory=lambda: np.full(5, np.nan))
+    """(5,) where it was when it decided first."""
     """Number of decisions in a row near `stood_at`."""
 
 
@@ -143,6 +145,8 @@ class Driver(ABC):
             ActionError: The rule gave no place to which a robot can go.
         """
         trail = self._trails[view.robot]
+        if np.isnan(trail.home[0]):
+            trail.home = view.pose.copy()
         self.observe(view)
         viewpoint = self._after_drive(view, trail)
         trail.follows = viewpoint is None or trail.waited
@@ -183,9 +187,18 @@ class Driver(ABC):
         self.forget_goal(view)
         return random_viewpoint(view, self._rng)
 
+    def go_to(self, view: RobotKnowledge, pose: np.ndarray) -> np.ndarray:
+        """Return the viewpoint (5,) of a robot on its way to a pose."""
+        return pose.copy()
+
     def _wander(self, view: RobotKnowledge, trail: Trail) -> np.ndarray:
-        """Return a random viewpoint (5,), the same one until the drive there has ended."""
-        if trail.random is None or not view.under_way:
+        """Return a viewpoint (5,) where the rule gives none: a random one, until the drive there has ended.
+
+        Where the mission ends at the start, the robot drives there.
+        """
+        if self._scenario.ending.return_to_start:
+            trail.random = self.go_to(view, trail.home)
+        elif trail.random is None or not view.under_way:
             trail.random = random_viewpoint(view, self._rng)
         return trail.random.copy()
 

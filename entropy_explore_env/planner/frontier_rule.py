@@ -82,7 +82,8 @@ class FrontierRule(Driver):
         super().reset(scenario, rng)
         self._search: Search = new_search(scenario.grid.voxels)
         self._memories: dict[int, _Memory] = {}
-        self._finest = min(scenario.ending.sigma_end, KNOWN_SIGMA) if self.refines else KNOWN_SIGMA
+        refines = self.refines and not scenario.ending.return_to_start  # all is seen, and may stay uncertain
+        self._finest = min(scenario.ending.sigma_end, KNOWN_SIGMA) if refines else KNOWN_SIGMA
 
     def cells_of(self, robot: int) -> VoxelFrontiers:
         """Return the frontier cells of a robot; available after its first choice."""
@@ -133,6 +134,13 @@ class FrontierRule(Driver):
             return super().make_room(view)
         stop = stop_towards(view, memory.paths, here, self._centre(view, away))
         return self._look(view, memory, stop)
+
+    def go_to(self, view: RobotKnowledge, pose: np.ndarray) -> np.ndarray:
+        """Return the viewpoint at a pose, or at a stop on the known path to it that is within reach."""
+        paths, here = self._memories[view.robot].paths, voxel_of(view, view.pose)
+        paths.start(here)
+        stop = stop_towards(view, paths, here, pose)
+        return np.array([*stop, *pose[3:]]) if len(stop) == 3 else stop
 
     def decide(self, view: RobotKnowledge) -> np.ndarray | None:
         """Return the viewpoint on the way to the rule's goal; see `Driver`."""

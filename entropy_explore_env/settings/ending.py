@@ -8,7 +8,13 @@ from typing import Literal
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.grid import MAX_VOXELS
-from entropy_explore_env.settings.validation import check, check_choice, check_count, check_within
+from entropy_explore_env.settings.validation import (
+    check,
+    check_choice,
+    check_count,
+    check_kind,
+    check_within,
+)
 
 BITS_OF_UNIT_GAUSSIAN = 0.5 * math.log2(2.0 * math.pi * math.e)
 """Differential entropy of N(0, 1) in bits: Rocha04, eq. 15 at σ = 1."""
@@ -50,6 +56,10 @@ class Ending:
         seen_share: Share of what can be seen at which the mission ends; None = by entropy.
         unseen_free_voxels: Number of unseen free voxels, of those that can be seen, at which the mission
             ends; None = by entropy, or by `seen_share`.
+        return_to_start: With `seen_share` or `unseen_free_voxels`: the mission ends when so much is seen and
+            every robot that still works stands where it started, up to the width of its body. Frontier rules,
+            `planned-rate` in plans that are to be seen whole among them, drive home when they find no
+            frontier.
         time_limit_s: Simulated time after which the mission is cut off (a truncation), 1e-3 to 1e9; inf =
             never.
         max_cycles: Steps after which the mission is cut off; None = never.
@@ -59,6 +69,7 @@ class Ending:
     termination: Literal["any", "all", "shared"] = "any"
     seen_share: float | None = None
     unseen_free_voxels: int | None = None
+    return_to_start: bool = False
     time_limit_s: float = 10_000.0
     max_cycles: int | None = None
 
@@ -74,6 +85,10 @@ class Ending:
             if self.seen_share is not None:
                 allowed = "None where seen_share is given"
                 raise SettingError("Ending.unseen_free_voxels", self.unseen_free_voxels, allowed)
+        check_kind(self, "return_to_start", bool)
+        if self.return_to_start and (not self.by_seen or self.termination == "shared"):
+            allowed = "False, unless a mission ends by what the team has seen, and termination is not shared"
+            raise SettingError("Ending.return_to_start", True, allowed)
         check_within(self, "time_limit_s", least=1e-3, most=1e9, inf=True)
         if self.max_cycles is not None:
             check_count(self, "max_cycles", 1, 2**62)

@@ -1,0 +1,46 @@
+"""Missions that end when all is seen and the team is home."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from baselines.experiments.mission import run_mission, scripted
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.explorer.planned_rate import PlannedRate
+from entropy_explore_env.missions.records import MissionEnd
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.ending import Ending
+from entropy_explore_env.settings.scenarios import find_scenario
+
+
+def mission(returns):
+    ending = {"seen_share": 1.0, "return_to_start": returns, "time_limit_s": 2000.0}
+    scenario = with_settings(scripted(find_scenario("bhattacharya-office")), {"robots": 2, "ending": ending})
+    env, seen_s = EntropyExploreEnv(scenario), []
+
+    def note(env):
+        clock = env.missions.state.missions[0]
+        if clock["explored_visible"] >= clock["visible"]:
+            seen_s.append(float(clock["time_s"]))
+
+    run_mission(env, PlannedRate(), 0, note)
+    return env, seen_s
+
+
+def test_the_mission_ends_when_all_is_seen_and_the_team_is_home():
+    env, seen_s = mission(returns=True)
+    clock, robots = env.missions.state.missions[0], env.missions.state.robots[0]
+    assert env.missions.over(0) is MissionEnd.SEEN and clock["explored_visible"] == clock["visible"]
+    assert clock["time_s"] > seen_s[0]
+    starts = env.missions._returning.homes[0]
+    assert (np.linalg.norm(robots["goal"][:, :3] - starts, axis=1) <= 0.6).all()
+    earlier, _ = mission(returns=False)
+    assert earlier.missions.state.missions[0]["time_s"] == pytest.approx(seen_s[0])
+
+
+def test_only_missions_that_end_by_what_was_seen_may_ask_for_it():
+    for settings in ({}, {"seen_share": 1.0, "termination": "shared"}):
+        with pytest.raises(SettingError, match=r"Ending.return_to_start = True: .*seen"):
+            Ending(return_to_start=True, **settings)
