@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -250,6 +250,12 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         if self.missions.episodes[0] < 0:
             raise CallOrderError("joint_map before reset: call reset() first")
         return joint_map(self.missions)
+
+    def set_world_block(
+        self, low_m: Sequence[float], high_m: Sequence[float], solid: bool = True, at_s: float | None = None
+    ) -> None:
+        """Change the true world under way, as when a door closes: see `Missions.set_world_block`."""
+        self.missions.set_world_block(0, low_m, high_m, solid, at_s)
 
     def render(self) -> np.ndarray | None:
         """The picture of this moment, (480, 640, 3) uint8 for `rgb_array`; `human` shows it by itself."""

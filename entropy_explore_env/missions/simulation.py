@@ -20,11 +20,18 @@ from entropy_explore_env.missions.returning import Returning
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.state import FROM_WORLD, MissionState, new_state
 from entropy_explore_env.missions.state_ranges import check_ranges
+from entropy_explore_env.missions.world_changes import (
+    WorldChange,
+    changed_world,
+    checked_change,
+    rescore,
+    robot_in_the_way,
+)
 from entropy_explore_env.randomness import Stream, check_seed, generator
 from entropy_explore_env.robots.range_sensor import true_coverage
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenario import Scenario
-from entropy_explore_env.settings.validation import check_instance, is_whole
+from entropy_explore_env.settings.validation import check_instance, is_number, is_whole
 from entropy_explore_env.worlds.given import checked_worlds, in_given_worlds
 from entropy_explore_env.worlds.load import require_unchanged, world_of_file
 from entropy_explore_env.worlds.world import World
@@ -97,6 +104,8 @@ class Missions:
         self.every_reset = DRAWN
         self.reward_function = ""
         self._returning = Returning(self.count, scenario.robots) if scenario.ending.return_to_start else None
+        self._changes: list[list[WorldChange]] = [[] for _ in range(self.count)]
+        self.world_changed = [False] * self.count
         self.seeds = [0] * self.count
         self.episodes = [-1] * self.count
         self.observations = np.zeros((self.count, scenario.robots, self.layout.size), np.float32)
@@ -196,6 +205,7 @@ class Missions:
         mission, world = start.mission, start.world
         self.seeds[mission], self.episodes[mission] = start.seed, start.episode
         self.options[mission] = start.options
+        self._changes[mission], self.world_changed[mission] = [], False
         self.world_numbers[mission] = -1 if start.world_number is None else start.world_number
         differs = world.ceiling is not None or world.unreadable is not None
         if differs and self.state.collision is self.state.truth:
@@ -223,6 +233,62 @@ class Missions:
             self.state.collision[row] = world.layout(self.scenario, kind).collision_mask.ravel()
             if self._no_fly.size:
                 self._no_fly[row] = world.no_fly_mask(kind.robot.planning_radius_m).ravel()
+
+    def set_world_block(
+        self,
+        mission: int,
+        low_m: Sequence[float],
+        high_m: Sequence[float],
+        solid: bool = True,
+        at_s: float | None = None,
+    ) -> None:
+        """Change the true world: the voxels whose centres lie in a box become solid, or free.
+
+        Args:
+            mission: Which of the E.
+            low_m: The box's lower corner (x, y, z), map frame.
+            high_m: Its upper corner.
+            solid: Whether the voxels become solid.
+            at_s: When, in simulated time: before the first step that begins then or later and finds no robot
+                in the way. None = now.
+
+        Raises:
+            CallOrderError: The mission was never reset.
+            SettingError: The box holds no voxel, the time has passed, or a robot is in the way now.
+            WorldError: No free voxel would be left.
+        """
+        if self.episodes[self._checked(mission)] < 0:
+            raise CallOrderError("set_world_block before reset: call reset() first")
+        now_s = float(self.state.missions[mission]["time_s"])
+        if at_s is not None and not (is_number(at_s) and now_s <= at_s < np.inf):
+            raise SettingError("at_s", at_s, f"None, or finite seconds from {now_s:g} on")
+        change = checked_change(self.grid, low_m, high_m, solid, now_s if at_s is None else float(at_s))
+        if at_s is not None:
+            self._changes[mission].append(change)
+        elif (robot := robot_in_the_way(self.rules, self.state, mission, change)) is not None:
+            raise SettingError("low_m, high_m", (low_m, high_m), f"a box that robot {robot} does not touch")
+        else:
+            self._change(mission, change)
+
+    def _change(self, mission: int, change: WorldChange) -> None:
+        """Change a mission's world now."""
+        world = self.worlds[mission]
+        assert world is not None
+        after, before = changed_world(world, change), self.state.truth[mission].copy()
+        self.worlds[mission], self.world_changed[mission] = after, True
+        self.state.truth[mission] = true_coverage(after.occupied, after.unreadable)
+        self._set_collision_masks(mission, after)
+        prior = float(self.rules.params["prior_precision"][0])
+        rescore(self.state, mission, before, self.state.truth[mission], prior)
+
+    def _change_worlds(self) -> None:
+        """Make the changes that are due and have no robot in their way."""
+        for mission, changes in enumerate(self._changes):
+            for change in list(changes):
+                due = change.at_s <= self.state.missions[mission]["time_s"]
+                if due and robot_in_the_way(self.rules, self.state, mission, change) is None:
+                    changes.remove(change)
+                    self._change(mission, change)
 
     def strategy_generator(self, mission: int) -> np.random.Generator:
         """The random stream of whoever chooses the actions in this mission's episode.
@@ -259,6 +325,8 @@ class Missions:
             )
         if self._compiled_step.proposes:
             continuous = self._chosen_viewpoints(discrete)
+        if any(self._changes):
+            self._change_worlds()
         self._compiled_step.step(self._arrays(), continuous, discrete)
         if self._returning is not None:
             self._returning.end(self.rules, self.state)

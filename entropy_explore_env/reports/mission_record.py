@@ -153,6 +153,8 @@ class CommandRecorder:
         missions = self._missions
         if missions.episodes[0] < 0:
             raise CallOrderError("record before reset: call reset() first")
+        if missions.world_changed[0]:
+            raise RecordError("mission", "its world changed under way", "one in a world that stays as it is")
         starts, number, world = missions.options[0]
         return MissionRecord(
             scenario=missions.scenario,
