@@ -48,11 +48,16 @@ WORLDS = (
     "height npz",
     "geotiff",
     "world npz",
+    "las",
+    "dae",
+    "esri grid",
+    "other images",
 )
 """Formats of worlds, as `world_samples` names them."""
 FORMATS = (*SAVED, *WORLDS)
-MOST_S, MOST_SAVED_S = 2.0, 5.0
-"""Most processor time for a world's file, and for a record or checkpoint and what it describes."""
+MOST_S, MOST_SAVED_S = 3.0, 5.0
+"""Most processor time for a world's file, with the start of a process that reads it, and for a record or
+checkpoint and what it describes."""
 MOST_READER_MIB, MOST_GROWTH_MIB = 512, 1024
 """Most memory of the process that reads worlds, and most growth of this one, which makes them."""
 _MOST_ERROR = 1000

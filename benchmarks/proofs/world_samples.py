@@ -96,7 +96,7 @@ def las(compressed: bool) -> bytes:
     import laspy
 
     scan = laspy.create(point_format=3, file_version="1.4")
-    scan.header.scales = [0.001] * 3
+    scan.header.scales = np.full(3, 0.001)
     scan.x, scan.y, scan.z = points().T.astype(np.float64)
     buffer = io.BytesIO()
     scan.write(buffer, do_compress=compressed)

@@ -237,7 +237,7 @@ def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float |
         reasons = "".join(f"; {note}" for note in voxels.notes)
         raise WorldError("world file", path, _NO_SPACE + (_SHADES if is_image else "") + reasons)
     for note in voxels.notes:
-        warnings.warn(f"{path}: {note}", WorldWarning, stacklevel=2)
+        warnings.warn(f"{path}: {note}", WorldWarning, stacklevel=4)
     if height_m is not None:
         if labels.shape[2] != 1:
             raise SettingError("height_m", height_m, "None: the file's world is 3-D already")

@@ -91,7 +91,7 @@ def test_settings_out_of_range_are_refused_before_anything_is_read(setting, valu
 
 @pytest.mark.parametrize("load", [load_world, load_octomap])
 def test_an_option_that_there_is_not_is_refused_with_the_one_that_is_like_it(load):
-    with pytest.raises(SettingError, match=r"voxl_size_m = 0\.2: allowed.*; did you mean voxel_size_m\?$"):
+    with pytest.raises(SettingError, match=r"voxl_size_m = 0\.2: expected.*; did you mean voxel_size_m\?$"):
         load("nowhere.bt", voxl_size_m=0.2)
 
 

@@ -18,8 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.worlds.files.elevation import MAX_SAMPLES, columns
-from entropy_explore_env.worlds.files.images import from_rows
+from entropy_explore_env.worlds.files.elevation import MAX_SAMPLES, columns_of_rows
 from entropy_explore_env.worlds.files.voxels import (
     FREE,
     SOLID,
@@ -161,7 +160,7 @@ def _height_map(entries: dict[str, np.ndarray], options: Options) -> Voxels:
     spacing = (float(steps[0]), float(steps[1]))
     if not all(0 < step < math.inf for step in spacing):
         raise RefusedError("a height map whose spacing_m is > 0")
-    return columns(from_rows(rows.astype(np.float64)), spacing, options)
+    return columns_of_rows(rows.astype(np.float64), spacing, options)
 
 
 assert (FREE, SOLID) == (0, 1)  # bits are labels

@@ -32,6 +32,16 @@ METRES_PER_DEGREE = 2.0 * math.pi * 6_371_008.8 / 360.0
 """Along a meridian of a sphere as large as the Earth."""
 
 
+def columns_of_rows(
+    rows_m: np.ndarray,
+    spacing_m: tuple[float, float],
+    options: Options,
+    corner_m: tuple[float, float] = (0.0, 0.0),
+) -> Voxels:
+    """Return the voxels of a height map whose rows (rows, columns) go from north to south; see `columns`."""
+    return columns(np.ascontiguousarray(rows_m[::-1].T), spacing_m, options, corner_m)
+
+
 def columns(
     elevation_m: np.ndarray,
     spacing_m: tuple[float, float],

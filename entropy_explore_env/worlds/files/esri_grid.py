@@ -12,8 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from entropy_explore_env.worlds.files.elevation import MAX_SAMPLES, columns
-from entropy_explore_env.worlds.files.images import from_rows
+from entropy_explore_env.worlds.files.elevation import MAX_SAMPLES, columns_of_rows
 from entropy_explore_env.worlds.files.voxels import Options, RefusedError, Voxels, content
 
 NEEDS = ()
@@ -42,4 +41,4 @@ def read(path: Path, options: Options) -> Voxels:
     south = about.get("yllcorner", about.get("yllcenter", 0.5 * step_y) - 0.5 * step_y)
     if not (math.isfinite(west) and math.isfinite(south)):
         raise RefusedError("an ESRI ASCII grid whose corner is finite")
-    return columns(from_rows(rows), (step_x, step_y), options, (west, south))
+    return columns_of_rows(rows, (step_x, step_y), options, (west, south))

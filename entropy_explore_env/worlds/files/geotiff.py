@@ -20,8 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from entropy_explore_env.errors import MissingExtraError
-from entropy_explore_env.worlds.files.elevation import MAX_SAMPLES, columns, degrees_as_metres
-from entropy_explore_env.worlds.files.images import from_rows
+from entropy_explore_env.worlds.files.elevation import MAX_SAMPLES, columns_of_rows, degrees_as_metres
 from entropy_explore_env.worlds.files.voxels import Options, RefusedError, Voxels, content
 
 NEEDS = (("tifffile", "tifffile"),)
@@ -72,24 +71,27 @@ def read(path: Path, options: Options) -> Voxels:
             if "imagecodecs" in str(error):
                 raise MissingExtraError("imagecodecs", "worlds") from None
             raise
-    elevation = from_rows(_heights_m(raw, tags, keys))
+    rows_m = _heights_m(raw, tags, keys)
+    height = len(rows_m)
     place = _place(tags)
     if place is None:
         edge_m = options.need("resolution_m", "a TIFF without ModelPixelScale and ModelTransformation")
-        return columns(elevation, (edge_m, edge_m), options)
+        return columns_of_rows(rows_m, (edge_m, edge_m), options)
     (step_x, step_y), (x, y) = place
     if keys.get("GTRasterTypeGeoKey") == _PIXEL_IS_POINT:
         x, y = x - 0.5 * step_x, y + 0.5 * step_y
-    west, south = x, y - elevation.shape[1] * step_y
+    west, south = x, y - height * step_y
     if not (math.isfinite(west) and math.isfinite(south)):
         raise RefusedError("a GeoTIFF whose corner is finite")
     if keys.get("GTModelTypeGeoKey") == _GEOGRAPHIC:
-        middle = south + 0.5 * elevation.shape[1] * step_y
+        middle = south + 0.5 * height * step_y
         if not -90.0 < middle < 90.0 or keys.get("GeogAngularUnitsGeoKey", _DEGREE) != _DEGREE:
             raise RefusedError("a GeoTIFF in degrees, between the poles")
-        return columns(elevation, degrees_as_metres(step_x, step_y, middle), options)
+        return columns_of_rows(rows_m, degrees_as_metres(step_x, step_y, middle), options)
     unit_m = _unit_m(keys, "ProjLinearUnits")
-    return columns(elevation, (step_x * unit_m, step_y * unit_m), options, (west * unit_m, south * unit_m))
+    return columns_of_rows(
+        rows_m, (step_x * unit_m, step_y * unit_m), options, (west * unit_m, south * unit_m)
+    )
 
 
 def _heights_m(raw: np.ndarray, tags: Mapping[int, Any], keys: Mapping[str, Any]) -> np.ndarray:

@@ -18,7 +18,7 @@ import numpy as np
 from PIL import Image
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.worlds.files.elevation import columns
+from entropy_explore_env.worlds.files.elevation import columns_of_rows
 from entropy_explore_env.worlds.files.voxels import (
     FREE,
     MAX_PIXELS,
@@ -64,9 +64,7 @@ def read(path: Path, options: Options) -> Voxels:
         step_m = options.get("elevation_step_m")
         spacing_m = options.need("resolution_m", "a 16-bit PNG")
         counts = np.asarray(picture).astype(np.float64)
-        return columns(
-            from_rows(counts * (1.0 if step_m is None else step_m)), (spacing_m, spacing_m), options
-        )
+        return columns_of_rows(counts * (step_m or 1.0), (spacing_m, spacing_m), options)
     edge_m = float(options.get("resolution_m") or PIXEL_M)
     below, above = limits(options)
     below = 0.5 * WHITE if below is None else below
@@ -192,8 +190,3 @@ def _notes(shades: np.ndarray, labels: np.ndarray, counts: np.ndarray, clear: in
     if clear >= _SOME * pixels:
         notes.append(f"{clear:,} pixels that are not wholly opaque count as unknown")
     return notes
-
-
-def from_rows(rows: np.ndarray) -> np.ndarray:
-    """(X, Y, …) from an image's (rows, columns, …): x to the right, y up."""
-    return np.ascontiguousarray(np.swapaxes(rows[::-1], 0, 1))

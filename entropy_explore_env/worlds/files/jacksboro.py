@@ -9,8 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from entropy_explore_env.worlds.files.elevation import columns, degrees_as_metres
-from entropy_explore_env.worlds.files.images import from_rows
+from entropy_explore_env.worlds.files.elevation import columns_of_rows, degrees_as_metres
 from entropy_explore_env.worlds.files.voxels import Options, Voxels
 
 NEEDS = (("matplotlib.cbook", "matplotlib"),)
@@ -28,4 +27,4 @@ def read(path: Path, options: Options) -> Voxels:
         rows = dem["elevation"].astype(np.float64)
         middle = 0.5 * (float(dem["ymin"]) + float(dem["ymax"]))
         spacing_m = degrees_as_metres(float(dem["dx"]), float(dem["dy"]), middle)
-    return columns(from_rows(rows), spacing_m, options)
+    return columns_of_rows(rows, spacing_m, options)
