@@ -22,7 +22,7 @@ import numpy as np
 
 from baselines.strategies.metrics import Options, Value
 from baselines.strategies.rules.coordinated_frontier import taken
-from entropy_explore_env.frontiers.knowledge import stays, under_way, voxel_of
+from entropy_explore_env.frontiers.knowledge import centres_of, stays, under_way, voxel_of
 from entropy_explore_env.planner.scene import Scene
 from entropy_explore_env.planner.stops import apart_m
 from entropy_explore_env.robots.knowledge import RobotKnowledge
@@ -204,12 +204,9 @@ class Round:
 
     def leave(self, view: RobotKnowledge, found: dict[int, Choice]) -> None:
         """Note what was allocated to the robot and to others."""
-        self.left, grid = view.robot in found, view.scenario.grid
+        self.left = view.robot in found
         self.plan = {
-            mate: (
-                grid.centre_of(np.stack(np.unravel_index(choice.voxel, grid.shape))),
-                view.time_s + _DELAY * choice.seconds,
-            )
+            mate: (centres_of(view, choice.voxel), view.time_s + _DELAY * choice.seconds)
             for mate, choice in found.items()
         }
 

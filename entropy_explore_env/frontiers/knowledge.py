@@ -31,6 +31,15 @@ def voxel_of(view: RobotKnowledge, pose: np.ndarray) -> int:
     return int(np.ravel_multi_index(tuple(indices), grid.shape))
 
 
+def centres_of(view: RobotKnowledge, voxels: int | np.ndarray) -> np.ndarray:
+    """Return the centres (..., 3) of (...) voxels, map frame; planar robots stay at their sensor's height."""
+    grid = view.scenario.grid
+    places = grid.centre_of(np.stack(np.unravel_index(voxels, grid.shape), axis=-1))
+    if view.planar:
+        places[..., 2] = view.pose[2]
+    return places
+
+
 def teammates_that_share(view: RobotKnowledge) -> Mapping[int, TeammateView]:
     """Return the teammates whose scans may reach the robot: none that is silent.
 

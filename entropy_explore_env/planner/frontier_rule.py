@@ -27,7 +27,7 @@ from entropy_explore_env.belief.paths.search import Search, new_search
 from entropy_explore_env.errors import ActionError, SettingError
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
-from entropy_explore_env.frontiers.knowledge import voxel_of
+from entropy_explore_env.frontiers.knowledge import centres_of, voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.driver import Driver
@@ -132,7 +132,7 @@ class FrontierRule(Driver):
         away = memory.paths.place_away_from(here, heard, self._rng)
         if away == NONE:
             return super().make_room(view)
-        stop = stop_towards(view, memory.paths, here, self._centre(view, away))
+        stop = stop_towards(view, memory.paths, here, centres_of(view, away))
         return self._look(view, memory, stop)
 
     def go_to(self, view: RobotKnowledge, pose: np.ndarray) -> np.ndarray:
@@ -228,7 +228,7 @@ class FrontierRule(Driver):
         at_once = robot.navigator == "planned" and math.isinf(robot.reach_m)
         if memory.viewpoint is not None and (at_once or not self._stands_at(view, memory.viewpoint)):
             return memory.viewpoint.copy()
-        end = self._centre(view, goal.place)
+        end = centres_of(view, goal.place)
         stop = end if at_once else stop_towards(view, memory.paths, here, end, self.stops_at_corners)
         return self._look(view, memory, stop, goal.gaze)
 
@@ -250,14 +250,6 @@ class FrontierRule(Driver):
 
     def _stands_at(self, view: RobotKnowledge, viewpoint: np.ndarray) -> bool:
         return apart_m(view, viewpoint) < 0.5 * self._scenario.grid.voxel_size_m
-
-    def _centre(self, view: RobotKnowledge, voxel: int) -> np.ndarray:
-        """Return a voxel's centre (3,) in the map frame; planar robots stay at their sensor's height."""
-        grid = self._scenario.grid
-        place = grid.centre_of(np.stack(np.unravel_index(voxel, grid.shape)))
-        if view.planar:
-            place[2] = view.pose[2]
-        return place
 
 
 class PickRule(FrontierRule):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from entropy_explore_env.frontiers.knowledge import voxel_of
+from entropy_explore_env.frontiers.knowledge import centres_of, voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 
@@ -27,7 +27,7 @@ def stop_towards(
         goal: (3,) or more numbers, in metres, map frame; itself where no path leads there.
         at_corners: Whether a robot that plans stops at corners, too.
     """
-    grid, robot, goal = view.scenario.grid, view.kind.robot, goal[:3]
+    robot, goal = view.kind.robot, goal[:3]
     reach_m = robot.reach_m * _WITHIN_REACH
     passes_corners = robot.navigator == "planned" and not at_corners
     if passes_corners and apart_m(view, goal) <= reach_m:
@@ -36,19 +36,31 @@ def stop_towards(
     if len(path) == 0:
         return goal
     if passes_corners:
-        places = grid.centre_of(np.stack(np.unravel_index(path, grid.shape), axis=-1))
-        axes = 2 if view.planar else 3
+        places, axes = centres_of(view, path), 2 if view.planar else 3
         beyond = np.flatnonzero(np.linalg.norm(places[:, :axes] - view.pose[:axes], axis=1) > reach_m)
         last = (int(beyond[0]) if len(beyond) else len(path)) - 1
         return np.asarray(places[max(last, 0)])
-    start, end = (grid.in_grid_units(np.append(p, (0.0, 0.0)))[:3] for p in (view.pose[:3], goal))
-    if paths.lattice.layer >= 0:
-        end[2] = start[2]
-    corners = paths.corners_of(path, start, end)
-    first = np.asarray(grid.origin_m) + (corners[0] if len(corners) else end) * grid.voxel_size_m
+    first = straightened(view, paths, path, goal)[0]
     return np.asarray(
         view.pose[:3] + (first - view.pose[:3]) * min(1.0, reach_m / max(apart_m(view, first), 1e-9))
     )
+
+
+def straightened(view: RobotKnowledge, paths: KnownPaths, path: np.ndarray, goal: np.ndarray) -> np.ndarray:
+    """Return (N, 3) points of a path of the latest search, pulled straight, map frame; the goal last.
+
+    Args:
+        view: Of the robot, at which the path begins.
+        paths: Through its known free space.
+        path: (V,) int32 its voxels.
+        goal: (3,) or more numbers, in metres, map frame; of planar robots in their plane.
+    """
+    grid = view.scenario.grid
+    start, end = (grid.in_grid_units(place[:3]) for place in (view.pose, goal))
+    if paths.lattice.layer >= 0:
+        end[2] = start[2]
+    corners = paths.corners_of(path, start, end)
+    return np.asarray(grid.origin_m) + (corners if len(corners) else end[None]) * grid.voxel_size_m
 
 
 def apart_m(view: RobotKnowledge, place: np.ndarray) -> float:

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.frontiers.knowledge import voxel_of
+from entropy_explore_env.frontiers.knowledge import centres_of, voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
+from entropy_explore_env.planner.stops import straightened
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 
 _NARROWEST_RAD = 0.1
@@ -28,14 +29,10 @@ def reachable_voxels(traversal_cost: np.ndarray, paths: KnownPaths) -> np.ndarra
 
 def path_points(view: RobotKnowledge, paths: KnownPaths, pose: np.ndarray) -> np.ndarray:
     """Return (N, 3) points of the known path to a pose by the latest search, pulled straight, map frame."""
-    grid, goal = view.scenario.grid, voxel_of(view, pose)
+    goal = voxel_of(view, pose)
     if goal == voxel_of(view, view.pose):
         return pose[None, :3].copy()
-    start, end = (grid.in_grid_units(place)[:3] for place in (view.pose, pose))
-    if paths.lattice.layer >= 0:
-        end[2] = start[2]
-    corners = paths.corners_of(paths.route_to(goal), start, end)
-    return np.asarray(grid.origin_m) + corners * grid.voxel_size_m
+    return straightened(view, paths, paths.route_to(goal), pose)
 
 
 def drawn_poses(
@@ -61,12 +58,5 @@ def yaws_around(wide_rad: float) -> list[float]:
 
 
 def poses_in(view: RobotKnowledge, voxels: int | np.ndarray, gazes: np.ndarray) -> np.ndarray:
-    """Return the poses (..., 5) in the middle of (...) voxels with (..., 2) yaws and pitches, map frame.
-
-    Planar robots stay at their height.
-    """
-    grid = view.scenario.grid
-    places = grid.centre_of(np.stack(np.unravel_index(voxels, grid.shape), axis=-1))
-    if view.planar:
-        places[..., 2] = view.pose[2]
-    return np.concatenate([places, gazes], axis=-1)
+    """Return the poses (..., 5) in the middle of (...) voxels with (..., 2) yaws and pitches, map frame."""
+    return np.concatenate([centres_of(view, voxels), gazes], axis=-1)

@@ -15,7 +15,7 @@ from entropy_explore_env.belief.entropy import LN2, fill_occupancy_entropy
 from entropy_explore_env.belief.paths.geodesic_cells import extract_path, new_tessellation, tessellate
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.frontiers.knowledge import belief_of, teammates_that_share, voxel_of
+from entropy_explore_env.frontiers.knowledge import belief_of, centres_of, teammates_that_share, voxel_of
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import (
@@ -106,10 +106,7 @@ class Territory:
 
     def viewpoint_on(self, view: RobotKnowledge, path: np.ndarray) -> np.ndarray:
         """Return the viewpoint (5,) at the farthest place of a path that one drive reaches, the gaze best."""
-        grid, robot, viewpoint = view.scenario.grid, view.kind.robot, view.pose.copy()
-        places = grid.centre_of(np.stack(np.unravel_index(path, grid.shape), axis=-1))
-        if view.planar:
-            places[:, 2] = view.pose[2]
+        robot, viewpoint, places = view.kind.robot, view.pose.copy(), centres_of(view, path)
         within = np.linalg.norm(places - view.pose[:3], axis=1) <= robot.reach_m * _WITHIN_REACH
         for index in np.flatnonzero(within)[::-1]:
             if index == 0 or robot.navigator == "planned" or self._line_is_free(view, places[index]):
