@@ -107,7 +107,7 @@ def beside_each_other(films: Sequence[Film], names: Sequence[str], width: int) -
 
 
 def _titled(picture: np.ndarray, title: str) -> np.ndarray:
-    """A picture with a line of text above it."""
+    """Return a picture with a line of text above it."""
     height, width, _ = picture.shape
     size = max(width // 24, 8)
     page = Image.new("RGB", (width, height + 2 * size), PAPER)
@@ -117,7 +117,7 @@ def _titled(picture: np.ndarray, title: str) -> np.ndarray:
 
 
 def filmed(scenario: Scenario, strategy: str, seed: int, pictures: int) -> Film:
-    """The film of a mission.
+    """Return the film of a mission.
 
     Args:
         scenario: The task.
@@ -140,7 +140,7 @@ def filmed(scenario: Scenario, strategy: str, seed: int, pictures: int) -> Film:
 
 
 def shrunk(picture: np.ndarray, width: int) -> np.ndarray:
-    """A picture (H, W, 3) uint8 in another width, its height in proportion."""
+    """Return a picture (H, W, 3) uint8 in another width, its height in proportion."""
     height = round(picture.shape[0] * width / picture.shape[1])
     return np.asarray(Image.fromarray(picture).resize((width, height), Image.Resampling.BOX))
 

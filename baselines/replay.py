@@ -103,7 +103,7 @@ def _refuse_settings(words: Sequence[str]) -> None:
 def _replayed(
     record: MissionRecord, log: MissionLog, show: Callable[[EntropyExploreEnv], None]
 ) -> EntropyExploreEnv:
-    """The environment after the commands of the record, or after the mission's end if that came earlier."""
+    """Return the environment after the record's commands, or after the mission's end if that came earlier."""
     env = EntropyExploreEnv(record.scenario, **given_worlds_of(record))
     env.missions.seeds[0], env.missions.episodes[0] = record.seed, record.episode - 1
     env.reset(seed=None if record.episode else record.seed, options=reset_options_of(record))
@@ -124,7 +124,7 @@ def _replayed(
 
 
 def _action(env: EntropyExploreEnv, agent: str, command: np.ndarray) -> np.ndarray:
-    """A recorded command as the agent's action; what filled it up is cut off."""
+    """Return a recorded command as the agent's action; what filled it up is cut off."""
     shape = env.action_space(agent).shape
     return command[: shape[0]] if shape else command
 

@@ -40,7 +40,7 @@ _FLOOR_SHARE, _FLOOR_EDGE_M = 0.16, 0.03
 
 
 def deciding_rows(effort: Effort) -> list[Row]:
-    """A decision of each strategy that has a limit."""
+    """Return a decision of each strategy that has a limit."""
     steps, few = effort.steps, min(effort.steps, _LARGE_STEPS)
     return [
         decision_row(ROOM, 3, "planned-rate", steps, 5.0),
@@ -63,7 +63,7 @@ def decision_row(scenario: Scenario, robots: int, strategy: str, steps: int, mos
 
 
 def plan_rows(name: str, path: str, world: World, effort: Effort) -> list[Row]:
-    """A plan's file: a mission, and decisions of `planned-rate`, which decides at every scan under way.
+    """Return rows of a mission in a plan's file, with decisions of `planned-rate` at every scan under way.
 
     It decides by openings until the map has little entropy, and by tours where all has to be seen.
     """
@@ -78,7 +78,7 @@ def plan_rows(name: str, path: str, world: World, effort: Effort) -> list[Row]:
 
 
 def mission_rows(effort: Effort) -> list[Row]:
-    """Steps with a dense scanner, seconds of missions, and bytes of kept episodes."""
+    """Return steps with a dense scanner, seconds of missions, and bytes of kept episodes."""
     rows = [scanner_row(effort)]
     if effort.large:
         rows.append(floor_row("a cluttered floor", floor(FLOOR)))
@@ -97,7 +97,7 @@ def room_row(strategy: str, missions: int) -> Row:
 
 
 def scanner_row(effort: Effort) -> Row:
-    """Steps a second of one robot that scans 720 rays in each, on 480 × 640 cells of clutter."""
+    """Return steps a second of one robot that scans 720 rays in each, on 480 × 640 cells of clutter."""
     sensor = {"field_of_view_rad": (2 * math.pi, 0.0), "angular_step_rad": math.pi / 360, "max_range_m": 8.0}
     settings = {"grid": Grid((480, 640, 1), 0.1), "robots": 1, "sensor": sensor, "time_limit_s": 1e6}
     settings["robot"] = {"reach_m": 0.5, "navigator": "straight"}
@@ -117,7 +117,7 @@ def scanner_row(effort: Effort) -> Row:
 
 
 def floor(shape: tuple[int, int, int]) -> World:
-    """A floor of 0.03 m cells, a sixth of them covered."""
+    """Return a floor of 0.03 m cells, a sixth of them covered."""
     return World(Grid(shape, _FLOOR_EDGE_M), cluttered(shape, _FLOOR_SHARE), "floor")
 
 

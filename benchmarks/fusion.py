@@ -54,7 +54,7 @@ class Measurements:
 
 
 def measure_room(grid: Grid, sensor: RangeSensor, scans: int, seed: int = 0) -> Measurements:
-    """Scans of an empty room from random places, in random directions up to 45° up or down."""
+    """Return scans of an empty room from random places, in random directions up to 45° up or down."""
     rng = np.random.default_rng(seed)
     starts = rng.uniform(0.5, np.asarray(grid.shape) - 0.5, (scans, 3))
     yaws = rng.uniform(-math.pi, math.pi, scans)
@@ -127,7 +127,7 @@ def fuse_floor(
     precision: np.ndarray,
     passes: int,
 ) -> float:
-    """The least that fusion has to do: two adds, one division and one product a voxel, nothing else.
+    """Return the least that fusion has to do: two adds, one division and one product a voxel, nothing else.
 
     Args:
         crossed: (N,) int32 voxels of one scan's rays, one after the other.

@@ -119,7 +119,7 @@ def traversal_costs(covered: np.ndarray) -> np.ndarray:
 
 
 def voronoi_row(name: str, costs: np.ndarray, effort: Effort) -> Row:
-    """Maps a second with the cells of SOURCES sources; SciPy gives the costs, and no cells."""
+    """Return maps a second with the cells of SOURCES sources; SciPy gives the costs, and no cells."""
     free, shape = np.flatnonzero(np.isfinite(costs)), costs.shape
     sources = np.random.default_rng(1).choice(free, SOURCES, replace=False).astype(np.int32)
     graph, ours = cost_graph(costs), new_tessellation((shape[0], shape[1], 1))

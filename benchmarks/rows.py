@@ -107,7 +107,7 @@ def interleave(jobs: Mapping[str, Job], rounds: int) -> dict[str, list[Taken]]:
 def compared(
     job: str, peer: str, ours: Sequence[float], theirs: Sequence[float], unit: str, goal: Goal | None = None
 ) -> Row:
-    """The row of a job beside a peer; the goal is about the ratio ours/theirs."""
+    """Return the row of a job beside a peer; the goal is about the ratio ours/theirs."""
     ratio = float(statistics.median(a / b for a, b in zip(ours, theirs, strict=True)))
     medians = float(statistics.median(ours)), float(statistics.median(theirs))
     text, holds = (None, None) if goal is None else (goal.text, goal.holds(ratio))
@@ -115,7 +115,7 @@ def compared(
 
 
 def alone(job: str, values: Iterable[float], unit: str, goal: Goal | None = None) -> Row:
-    """The row of a job without a peer; the goal is about the median itself."""
+    """Return the row of a job without a peer; the goal is about the median itself."""
     value = float(statistics.median(values))
     text, holds = (None, None) if goal is None else (goal.text, goal.holds(value))
     return Row(job, None, value, None, unit, None, text, holds)

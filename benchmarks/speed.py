@@ -108,7 +108,7 @@ def checked(args: Args) -> tuple[dict[str, Callable[[Effort], list[Row]]], Any]:
 
 
 def machine() -> dict[str, Any]:
-    """What the figures were measured on."""
+    """Return what the figures were measured on."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
         "processor": processor(),
@@ -121,7 +121,7 @@ def machine() -> dict[str, Any]:
 
 
 def cells(row: Row) -> tuple[str, ...]:
-    """A row as people read it: job, ours, peer, theirs, ratio, goal, holds."""
+    """Return a row as people read it: job, ours, peer, theirs, ratio, goal, holds."""
     return (
         row.job,
         f"{shown(row.ours)} {row.unit}",
@@ -139,7 +139,7 @@ def shown(value: float) -> str:
 
 
 def sentence(about: dict[str, Any]) -> str:
-    """The machine in one sentence."""
+    """Return the machine in one sentence."""
     packages = ", ".join(f"{name} {version}" for name, version in about["packages"].items())
     return (
         f"{about['processor']}, {about['cores']} cores (load {about['load_1_min']} at the end), "
@@ -163,7 +163,7 @@ def print_table(about: dict[str, Any], rows: Sequence[Row]) -> None:
 
 
 def markdown(about: dict[str, Any], rows: Sequence[Row], only: str | None = None) -> str:
-    """The page for `docs/results/`: table, machine, command; of all jobs, or of those that a word names."""
+    """Return the page for `docs/results/`: table, machine, command; of all jobs, or of one word's."""
     return (
         f"# Speed beside peers{f': {only}' if only else ''}\n\n"
         f"Made by `{about['command']}`. One process, one thread unless said. Each job and its peer take "

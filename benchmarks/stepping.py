@@ -81,7 +81,7 @@ class Team:
         self.envs = [EntropyExploreEnv(scenario) for _ in range(missions)]
 
     def run(self, actions: np.ndarray, first_seed: int = 0) -> Taken:
-        """What the steps take after a reset of all; later resets are timed.
+        """Return what the steps take after a reset of all; later resets are timed.
 
         Args:
             actions: (steps, E, A, 5) float32.
@@ -115,7 +115,7 @@ class Batch:
         self.env = EntropyExploreVectorEnv(ENDLESS, missions, threads=threads, autoreset_mode="SameStep")
 
     def run(self, actions: np.ndarray) -> Taken:
-        """What the steps (steps, E, A, 5) take after a reset of all."""
+        """Return what the steps (steps, E, A, 5) take after a reset of all."""
 
         def advance(steps: np.ndarray) -> None:
             for action in steps:
@@ -129,7 +129,7 @@ class Batch:
 
 
 def step_rates(scenarios: Mapping[str, Scenario], effort: Effort, peer: Spread | None) -> dict[str, list]:
-    """Steps a second of one ParallelEnv of each scenario, and of the peer, round by round in turns."""
+    """Return steps a second of one ParallelEnv of each scenario, and of the peer, round by round in turns."""
     steps, jobs = effort.steps, dict[str, Job]()
     for name, scenario in scenarios.items():
         team = Team(scenario)
@@ -143,7 +143,7 @@ def step_rates(scenarios: Mapping[str, Scenario], effort: Effort, peer: Spread |
 
 
 def step_rows(effort: Effort) -> list[Row]:
-    """Steps beside simple_spread, and with drift, fiducials and summaries beside without."""
+    """Return steps beside simple_spread, and with drift, fiducials and summaries beside without."""
     robot = {"localization": _DRIFT}
     scenarios = {
         "plain": TURNING,
@@ -209,7 +209,7 @@ def batch_rows(missions: int, effort: Effort) -> list[Row]:
 
 
 def python_calls(batch: Batch, steps: int = 5) -> float:
-    """Calls of Python and C functions in one step."""
+    """Return calls of Python and C functions in one step."""
     actions = turns(steps, batch.missions, 0)
     batch.run(actions)
     count = 0
@@ -245,7 +245,7 @@ def size_rows(effort: Effort) -> list[Row]:
 
 
 def _walk(shape: tuple[int, int, int]) -> Job:
-    """Steps in an empty world of some shape, with the same random actions in each round."""
+    """Return steps in an empty world of some shape, with the same random actions in each round."""
     settings = {"robots": 2, "decision_period_s": None, "sensor": {"max_range_m": 2.5}, "ending": _NO_END}
     settings |= {"channel": {"i_min_bits": 0.0}, "observation": {"overview": True}}
     env = EntropyExploreEnv(with_settings(ROOM, {**settings, "grid": Grid(shape, ROOM.grid.voxel_size_m)}))

@@ -114,7 +114,7 @@ __all__ = [
 
 
 def environment_id(scenario: str) -> str:
-    """The id of a named scenario: `room-furnished` → `entropy_explore_env/RoomFurnished-v1`.
+    """Return the id of a named scenario: `room-furnished` → `entropy_explore_env/RoomFurnished-v1`.
 
     Raises:
         SettingError: No scenario has this name.

@@ -39,7 +39,7 @@ def allow_read_memory(read_memory_mib: float | None) -> None:
 
 
 def whole_number(word: str) -> int:
-    """A whole number as one types it: `2500000`, `2_500_000`, `2.5e6` or `1e6`.
+    """Return a whole number as one types it: `2500000`, `2_500_000`, `2.5e6` or `1e6`.
 
     Raises:
         ValueError: It is something else.
@@ -53,7 +53,7 @@ def whole_number(word: str) -> int:
 
 
 def home_path(word: str) -> Path:
-    """A path as one types it, `~` at its beginning standing for the home folder.
+    """Return a path as one types it, `~` at its beginning standing for the home folder.
 
     Raises:
         ValueError: There is no such home folder.

@@ -37,7 +37,7 @@ def main(words: Sequence[str]) -> int:
 
 
 def findings() -> dict[str, Any]:
-    """What there is, as plain values.
+    """Return what there is, as plain values.
 
     Keys: `version`, `library` (its folder), `python`, `system`, `processors`; `packages` and `extras` (name →
     version, None where it is not installed); `pins` (extra → packages of which another version is installed
@@ -70,7 +70,7 @@ def findings() -> dict[str, Any]:
 
 
 def report(found: dict[str, Any]) -> str:
-    """The findings as lines for people."""
+    """Return the findings as lines for people."""
     lines = [
         f"entropy_explore_env {found['version']} in {found['library']}",
         f"Python {found['python']} ({sys.executable}), {found['system']}, {found['processors']} processors",
@@ -103,7 +103,7 @@ def _named(packages: dict[str, str | None]) -> str:
 
 
 def _kernels(folder: Path | None) -> dict[str, Any]:
-    """What is in the folder of compiled kernels; of this version of the library, and of others."""
+    """Return what is in the folder of compiled kernels; of this version of the library, and of others."""
     found: dict[str, Any] = {"folder": None if folder is None else str(folder)}
     paths = sorted(folder.glob(f"*{SUFFIX}")) if folder is not None and folder.is_dir() else []
     rooms = Counter(".".join(path.name.rpartition("-")[0].split(".")[:2]) for path in paths)

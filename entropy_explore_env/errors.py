@@ -15,7 +15,7 @@ _LONGEST_VALUE = 200
 
 
 def shown(value: object) -> str:
-    """A value in one line of a message; of one that cannot be shown, what kind it is."""
+    """Return a value in one line of a message; of one that cannot be shown, what kind it is."""
     try:
         text = " ".join(repr(value).split())
     except Exception:  # a repr of somebody else's, or a whole number of too many digits
@@ -31,12 +31,12 @@ class ShownValue:
         self.shown = shown
 
     def __repr__(self) -> str:
-        """What `repr` showed of the value."""
+        """Return what `repr` showed of the value."""
         return self.shown
 
 
 def _passed_on(value: object) -> object:
-    """The value, if it can be pickled and restored."""
+    """Return the value, if it can be pickled and restored."""
     try:
         pickle.loads(pickle.dumps(value))
     except Exception:  # objects may raise whatever they want
@@ -45,7 +45,7 @@ def _passed_on(value: object) -> object:
 
 
 def did_you_mean(word: object, known: Iterable[str]) -> str:
-    """The known name that is most like a word, as the end of a message; empty where none is like it."""
+    """Return the known name most like a word, as the end of a message; empty where none is like it."""
     alike = difflib.get_close_matches(word, list(known), n=1) if isinstance(word, str) else []
     return f"; did you mean {alike[0]}?" if alike else ""
 

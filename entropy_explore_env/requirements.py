@@ -29,7 +29,7 @@ class Requirement(NamedTuple):
 
 
 def needed() -> list[str]:
-    """The packages that the library always needs; none where it runs from its folder, not installed."""
+    """Return the packages that the library always needs; none where it is not installed."""
     return [each.name for each in _requirements(_OURS) if each.extra is None]
 
 
@@ -65,7 +65,7 @@ def _brought() -> dict[str, list[Requirement]]:
 
 
 def version_of(name: str) -> str | None:
-    """The version of an installed package; None = it is not installed."""
+    """Return the version of an installed package; None = it is not installed."""
     try:
         return importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:
@@ -73,7 +73,7 @@ def version_of(name: str) -> str | None:
 
 
 def _requirements(distribution: str) -> Iterator[Requirement]:
-    """What a distribution needs here; nothing where it is not installed."""
+    """Yield what a distribution needs here; nothing where it is not installed."""
     try:
         lines = importlib.metadata.requires(distribution) or []
     except importlib.metadata.PackageNotFoundError:

@@ -70,11 +70,11 @@ class Normaliser(RunningMeanStd):
         return (values - self.mean) / self.std
 
     def denormalise(self, values: np.ndarray) -> np.ndarray:
-        """The inverse of `normalise`."""
+        """Return the inverse of `normalise`."""
         return values * self.std + self.mean
 
     def arrays(self, name: str) -> dict[str, np.ndarray]:
-        """What a checkpoint keeps: arrays whose names begin with `name`."""
+        """Return what a checkpoint keeps: arrays whose names begin with `name`."""
         return {
             f"{name}_count": np.array(self.count),
             f"{name}_mean": self.mean,

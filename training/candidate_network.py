@@ -241,7 +241,7 @@ class CandidateHeads(nn.Module):
         return self.actor(features)
 
     def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
-        """The critic's units (N, D)."""
+        """Return the critic's units (N, D)."""
         return self.critic(features)
 
 
@@ -249,7 +249,7 @@ class _Logits(CategoricalDistribution):
     """A distribution whose logits come from the actor as they are."""
 
     def proba_distribution_net(self, latent_dim: int) -> nn.Module:
-        """The identity: the logits need no further layer."""
+        """Return the identity: the logits need no further layer."""
         del latent_dim
         return nn.Identity()
 
@@ -318,7 +318,7 @@ def actor_frozen(policy: ActorCriticPolicy, frozen: bool) -> Iterator[None]:
 
 
 def candidate_parts(layout: ObservationLayout) -> CandidateParts:
-    """What the network reads of a scenario's observations.
+    """Return what the network reads of a scenario's observations.
 
     Raises:
         SettingError: Features of candidates, or the mask, are not observed.

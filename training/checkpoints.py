@@ -67,14 +67,14 @@ class SilentRunnersError(EntropyExploreError):
 
 
 def stored_bytes(arrays: Mapping[str, np.ndarray]) -> bytes:
-    """An archive of arrays, not compressed."""
+    """Return an archive of arrays, not compressed."""
     file = io.BytesIO()
     np.savez(file, **arrays)  # pyright: ignore[reportArgumentType] - names are those of arrays
     return file.getvalue()
 
 
 def stored_arrays(content: bytes) -> dict[str, np.ndarray]:
-    """The arrays of an archive that `stored_bytes` made.
+    """Return the arrays of an archive that `stored_bytes` made.
 
     Raises:
         ValueError: Its arrays are compressed. A broken archive raises whatever zipfile and NumPy raise.
@@ -207,12 +207,12 @@ def _write_folder(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def checkpoint_name(kind: str, steps: int) -> str:
-    """The name of a checkpoint's folder; names of one kind sort by steps."""
+    """Return the name of a checkpoint's folder; names of one kind sort by steps."""
     return f"{kind}-{steps:012d}"
 
 
 def _numbered(folder: Path, kind: str) -> list[Path]:
-    """The checkpoints of a kind, oldest first."""
+    """Return the checkpoints of a kind, oldest first."""
     return sorted(path for path in folder.glob(f"{kind}-*") if path.name.rpartition("-")[2].isdecimal())
 
 
@@ -224,7 +224,7 @@ def forget_later(folder: Path, kind: str, steps: int) -> None:
 
 
 def latest_checkpoint(folder: Path, *kinds: str) -> Path:
-    """The folder itself if it is a checkpoint, else its latest one of the first kind that it has.
+    """Return the folder itself if it is a checkpoint, else its latest one of the first kind that it has.
 
     Raises:
         CheckpointError: There is none.
@@ -274,7 +274,7 @@ def load_checkpoint(folder: Path, training: bool = False) -> Checkpoint:
 
 
 def _settings(folder: Path, head: Mapping[str, Any]) -> PolicySettings:
-    """The PolicySettings that a head describes."""
+    """Return the PolicySettings that a head describes."""
     features, hidden = head.get("features"), head.get("hidden")
     if not isinstance(features, str) or features not in NETWORKS:
         raise CheckpointError(f"{folder}: features", features, one_of(features, NETWORKS))
@@ -349,7 +349,7 @@ def _observation_of(scenario: Scenario) -> dict[str, list[int]]:
 
 
 def _content(file: Path, digests: Mapping[str, Any]) -> bytes:
-    """A file's content, if it is what save_checkpoint wrote."""
+    """Return a file's content, if it is what save_checkpoint wrote."""
     try:
         content = file.read_bytes()
     except OSError as error:

@@ -157,7 +157,7 @@ def default_rivals(policy: str, trained: Scenario) -> list[str]:
 
 
 def evaluation_scenario(learned: Scenario, name: str | None = None, robots: int | None = None) -> Scenario:
-    """The scenario of a test: as its name says, with test worlds, and of training the robots and the channel.
+    """Return the scenario of a test: that of a name with test worlds, and training's robots and channel.
 
     Args:
         learned: The scenario of training.
@@ -229,7 +229,7 @@ def compare(
 def _row(
     name: str, records: Sequence[Record], times: np.ndarray, ours: np.ndarray, is_policy: bool
 ) -> dict[str, Any]:
-    """A strategy's row of the table."""
+    """Return a strategy's row of the table."""
     median, low, high = median_interval(times)
     row: dict[str, Any] = {
         "strategy": name,
@@ -277,7 +277,7 @@ def show(compared: dict[str, Any]) -> None:
 
 
 def table_cells(row: dict[str, Any], seeds: int) -> list[str]:
-    """A row as text."""
+    """Return a row as text."""
     cells = [
         row["strategy"],
         f"{row['median_s']:,.0f} s ({row['low_s']:,.0f} … {row['high_s']:,.0f})",

@@ -34,7 +34,7 @@ class MoveAndGaze(CategoricalDistribution):
         self._sizes = (moves, gazes)
 
     def proba_distribution_net(self, latent_dim: int) -> nn.Module:
-        """The identity: the scores need no further layer."""
+        """Return the identity: the scores need no further layer."""
         del latent_dim
         return nn.Identity()
 
@@ -251,7 +251,7 @@ class GazeHeads(nn.Module):
         return torch.cat([self.moves(units), self.gazes(looked)[:, :, 0]], dim=1)
 
     def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
-        """The critic's units."""
+        """Return the critic's units."""
         return self.critic(features)
 
 
@@ -310,7 +310,7 @@ NETWORKS = (*FEATURES, "candidates")
 
 
 def policy_class(features: str) -> type[ActorCriticPolicy]:
-    """The policy that goes with a name of NETWORKS."""
+    """Return the policy that goes with a name of NETWORKS."""
     return {"gazes": GazePolicy, "candidates": CandidatePolicy}.get(features, ActorCriticPolicy)
 
 

@@ -44,7 +44,7 @@ POLICIES = ("best", "step")
 def make_policy(
     settings: PolicySettings, schedule: Callable[[float], float] = lambda remaining: 0.0
 ) -> ActorCriticPolicy:
-    """A policy with fresh weights, as Stable-Baselines3 trains it."""
+    """Return a policy with fresh weights, as Stable-Baselines3 trains it."""
     size = ObservationLayout(settings.scenario).size + settings.privileged
     return policy_class(settings.features)(
         spaces.Box(-np.inf, np.inf, (size,), np.float32),
@@ -78,7 +78,7 @@ def settings_of_policy(
 
 
 def load_policy(checkpoint: Checkpoint) -> ActorCriticPolicy:
-    """The policy of a checkpoint.
+    """Return the policy of a checkpoint.
 
     Raises:
         CheckpointError: Its weights do not fit its settings.
@@ -112,7 +112,7 @@ def load_weights(policy: ActorCriticPolicy, checkpoint: Checkpoint) -> None:
 
 
 def weights_of(policy: ActorCriticPolicy) -> dict[str, torch.Tensor]:
-    """A policy's weights, each under one name, without the normalisation of observations."""
+    """Return a policy's weights, each under one name, without the normalisation of observations."""
     named = policy.state_dict().items()
     return {name: each for name, each in named if not name.startswith(_SHARED) and name not in _NORMALISATION}
 
@@ -183,7 +183,7 @@ class Misfit(NamedTuple):
 
 
 def misfit(scenario: Scenario, trained: Scenario) -> Misfit | None:
-    """The first reason why observations or actions of a scenario are not those of training; None = they are.
+    """Return the first reason why a scenario's observations or actions are not training's; None = they are.
 
     Args:
         scenario: With the observation and the action of training.
@@ -273,7 +273,7 @@ class LearnedPolicy:
         return self.choose_all([view])[0]
 
     def choose_all(self, views: Sequence[RobotView]) -> list[np.ndarray]:
-        """The policy's viewpoint for each view."""
+        """Return the policy's viewpoint for each view."""
         if not views:  # all robots drive
             return []
         observations = np.stack([self._observer.observe(view) for view in views])
@@ -282,7 +282,7 @@ class LearnedPolicy:
 
 
 def policy_folder(name: str) -> Path:
-    """The folder that a strategy's name means: `pretrained:NAME`, or a folder.
+    """Return the folder that a strategy's name means: `pretrained:NAME`, or a folder.
 
     Raises:
         SettingError: No policy of this name comes with the project.
@@ -297,7 +297,7 @@ def policy_folder(name: str) -> Path:
 
 
 def make_policy_strategy(name: str) -> LearnedPolicy:
-    """The strategy of a learned policy.
+    """Return the strategy of a learned policy.
 
     Args:
         name: `pretrained:NAME`, or a folder.
@@ -310,6 +310,6 @@ def make_policy_strategy(name: str) -> LearnedPolicy:
 
 
 def policy_files(name: str) -> list[Path]:
-    """The files that determine, with the code, what a learned policy does: those of its checkpoint."""
+    """Return the files that determine, with the code, what a learned policy does: those of its checkpoint."""
     checkpoint = latest_checkpoint(policy_folder(name), *POLICIES)
     return [checkpoint / "policy.json", checkpoint / "policy.safetensors"]

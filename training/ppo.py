@@ -278,7 +278,7 @@ def settled_arguments(args: Args) -> Args:
 
 
 def training_task(args: Args) -> TrainingTask:
-    """What the policy learns in.
+    """Return what the policy learns in.
 
     Raises:
         SettingError: An option is not allowed.
@@ -390,7 +390,7 @@ def set_up(args: Args, task: TrainingTask) -> TrainingState:
 
 
 def less_the_seconds(figures: StepFigures) -> np.ndarray:
-    """The reward of a step: less the seconds that it took, (E, A)."""
+    """Return the reward of a step: less the seconds that it took, (E, A)."""
     return -figures.elapsed_s
 
 
@@ -546,7 +546,7 @@ class DecisionPPO(PPO):
         self.train()
 
     def _excluded_save_params(self) -> list[str]:
-        """What `save` leaves out: the missions, and the buffer that refers to them."""
+        """Return what `save` leaves out: the missions, and the buffer that refers to them."""
         return [*super()._excluded_save_params(), "rollout_buffer_class", "rollout_buffer_kwargs"]
 
 
@@ -580,7 +580,7 @@ def finished(args: Args, state: TrainingState) -> bool:
 
 
 def told(changed: Mapping[str, object]) -> str:
-    """What is said of options that differ from those that a run was started with."""
+    """Return what is said of options that differ from those that a run was started with."""
     return "".join(f"; {name} was {value}" for name, value in changed.items())
 
 

@@ -70,7 +70,7 @@ class Progress:
         return bool(self.curve) and self.curve[-1]["steps"] == steps
 
     def curve_csv(self) -> str:
-        """The curve as a table."""
+        """Return the curve as a table."""
         return csv_table({name: [row[name] for row in self.curve] for name in self.curve[0]})
 
 

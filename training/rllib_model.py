@@ -48,7 +48,7 @@ class RunningStats(nn.Module):
         self.register_buffer("variance", torch.ones(size, dtype=torch.float64))
 
     def normaliser(self, memory: float = np.inf) -> Normaliser:
-        """The Normaliser with these numbers; see there for `memory`."""
+        """Return the Normaliser with these numbers; see there for `memory`."""
         stats = Normaliser(len(self.mean), memory)
         stats.count = float(self.count)
         stats.mean, stats.var = self.mean.numpy().copy(), self.variance.numpy().copy()
@@ -122,7 +122,7 @@ class _Actions(Distribution):
 
     @classmethod
     def from_logits(cls, logits: torch.Tensor, **kwargs: Any) -> _Actions:  # noqa: ANN401 - RLlib's
-        """The distribution of these scores."""
+        """Return the distribution of these scores."""
         del kwargs
         return cls(logits)
 
@@ -152,23 +152,23 @@ class _Actions(Distribution):
         return entropy
 
     def kl(self, other: Distribution, **kwargs: Any) -> torch.Tensor:  # noqa: ANN401 - RLlib's
-        """Not used: PPO clips."""
+        """Refuse: PPO clips."""
         raise NotImplementedError
 
     @staticmethod
     def required_input_dim(space: gymnasium.Space, **kwargs: Any) -> int:  # noqa: ANN401 - RLlib's
-        """The policy knows how many scores it gives."""
+        """Refuse: the policy itself knows how many scores it gives."""
         raise NotImplementedError
 
     def to_deterministic(self) -> TorchDeterministic:
-        """The likeliest actions."""
+        """Return the likeliest actions."""
         return TorchDeterministic(self._drawn.mode())
 
 
 def policy_in(
     weights: dict[str, np.ndarray], settings: PolicySettings, progress: dict[str, Any]
 ) -> Checkpoint:
-    """The policy as `training.checkpoints` keeps it, from a module's state.
+    """Return the policy as `training.checkpoints` keeps it, from a module's state.
 
     Args:
         weights: State of a SharedPolicyModule.
@@ -258,7 +258,7 @@ class DecisionAdvantages(ConnectorV2):
         batch: dict[str, Any],
         **kwargs: Any,  # noqa: ANN401 - RLlib's
     ) -> dict[str, Any]:
-        """The decisions in an order of chance, with standardised advantages and normalised returns.
+        """Return the decisions in an order of chance, with standardised advantages and normalised returns.
 
         RLlib's minibatches of a first epoch would be decisions of the same few missions.
         """

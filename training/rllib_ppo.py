@@ -190,7 +190,7 @@ def check(args: Args) -> None:
 
 
 def parsed(words: Sequence[str]) -> Args:
-    """The arguments of a command line; what is not given is the scenario's own.
+    """Return the arguments of a command line; what is not given is the scenario's own.
 
     Raises:
         UsageError: The words do not fit.
@@ -203,7 +203,7 @@ def parsed(words: Sequence[str]) -> Args:
 
 
 def settled_arguments(args: Args) -> Args:
-    """The same arguments wherever the run is continued.
+    """Return the same arguments wherever the run is continued.
 
     Raises:
         SettingError: A file of JSON does not hold what it should.
@@ -307,7 +307,7 @@ def decisions_of(result: dict[str, Any]) -> float:
 
 
 def progress_row(result: dict[str, Any], iteration: int, robots: int) -> dict[str, float]:
-    """A row of progress.csv from RLlib's result; figures of missions are NaN until one has ended.
+    """Return a row of progress.csv from RLlib's result; figures of missions are NaN until one has ended.
 
     `robot_steps` are those of `training.ppo`: steps of the environment times robots.
     """
@@ -324,7 +324,7 @@ def progress_row(result: dict[str, Any], iteration: int, robots: int) -> dict[st
 
 
 def progress_line(row: dict[str, float]) -> str:
-    """An iteration as the terminal shows it."""
+    """Return an iteration as the terminal shows it."""
     begin = f"{row['decisions']:>11,.0f} decisions"
     if math.isnan(row["t_mission_s"]):
         return f"{begin}  no mission has ended yet"
@@ -333,7 +333,7 @@ def progress_line(row: dict[str, float]) -> str:
 
 
 def validation_line(steps: int, found: Validation) -> str:
-    """A validation as the terminal shows it."""
+    """Return a validation as the terminal shows it."""
     took = f"missions take {found.median_s:,.1f} s (median), {found.finished:.0%} finished"
     return f"{steps:>11,} decisions  validated: {took}"
 
@@ -349,7 +349,7 @@ def append_row(path: Path, row: dict[str, float]) -> None:
 
 
 def last_checkpoint(folder: Path) -> Path | None:
-    """The latest whole checkpoint; None where there is none."""
+    """Return the latest whole checkpoint; None where there is none."""
     return max(folder.glob("checkpoint-[0-9]*[0-9]"), default=None)
 
 

@@ -39,7 +39,7 @@ _VALUE_LOSS = 0.5
 
 
 def environment_settings(args: Args) -> dict[str, Any]:
-    """The settings of the environment to learn in, RLlib's `env_config`.
+    """Return the settings of the environment to learn in, RLlib's `env_config`.
 
     Raises:
         SettingError: There is no such scenario, or it does not allow the settings.
@@ -53,7 +53,7 @@ def environment_settings(args: Args) -> dict[str, Any]:
 
 
 def policy_of(args: Args, env_settings: dict[str, Any]) -> PolicySettings:
-    """The policy that learns, of which any trainer and strategy can be made."""
+    """Return the policy that learns, of which any trainer and strategy can be made."""
     return PolicySettings(env_settings["scenario"], args.features, tuple(args.hidden))
 
 
@@ -193,7 +193,7 @@ def _numbers(found: Validation) -> dict[str, Any]:
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """The rows of a table of numbers, none where there is no file; empty cells are None."""
+    """Return the rows of a table of numbers, none where there is no file; empty cells are None."""
     if not path.exists():
         return []
     with path.open(encoding="utf-8", newline="") as file:

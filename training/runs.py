@@ -82,7 +82,7 @@ Options = TypeVar("Options", bound=RunOptions)
 
 
 def options_json(args: Any) -> dict[str, Any]:  # noqa: ANN401 - a dataclass of options
-    """The options of a command as JSON holds them, without those that say where the run is."""
+    """Return the options of a command as JSON holds them, without those that say where the run is."""
     fields = {each.name: getattr(args, each.name) for each in dataclasses.fields(args)}
     return {
         name: str(value) if isinstance(value, Path) else settings_of(value)
@@ -109,7 +109,7 @@ def save_options(folder: Path, args: RunOptions, module: str, words: Sequence[st
 
 
 def _files_of(args: RunOptions) -> list[Path]:
-    """The world files that options name."""
+    """Return the world files that options name."""
     task = getattr(args, "task", None)
     named = (*(task.world if task is not None else ()), *getattr(args, "validation_world", ()))
     return [Path(file) for file in named if Path(file).is_file()]
@@ -136,7 +136,7 @@ def resumed_options(
     description: str | None = None,
     settle: Callable[[Options], Options] = lambda options: options,
 ) -> tuple[Options, dict[str, Any]]:
-    """The options of a run that is continued: those that it was started with, and what may differ.
+    """Return the options of a run that is continued: those that it was started with, and what may differ.
 
     Args:
         kind: The dataclass of options.
@@ -188,7 +188,7 @@ def _flat(options: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def resume_command(module: str, folder: Path) -> str:
-    """What one types to continue a run."""
+    """Return what one types to continue a run."""
     return shlex.join(["python", "-m", module, "--resume", str(folder)])
 
 
@@ -238,13 +238,13 @@ class TrainingState:
 
 
 def save_policy(state: TrainingState) -> Checkpoint:
-    """The policy alone."""
+    """Return the policy alone."""
     stats = state.observation_stats.arrays("observations") | state.buffer.return_stats.arrays("returns")
     return Checkpoint(state.settings, state.summary(), weights_of(state.model.policy), stats)
 
 
 def save_state(state: TrainingState) -> Checkpoint:
-    """The policy and all that training needs to continue, between two rollouts."""
+    """Return the policy and all that training needs to continue, between two rollouts."""
     checkpoint, model = save_policy(state), state.model
     optimiser = model.policy.optimizer.state_dict()["state"]
     tensors = {f"{i}.{name}": each for i, own in optimiser.items() for name, each in own.items()}
@@ -307,7 +307,7 @@ def _restore_trainer(state: TrainingState, checkpoint: Checkpoint) -> None:
 
 
 def checkpoint_to_resume(folder: Path) -> Checkpoint | None:
-    """The latest checkpoint of a run; None where it has none yet, so that it begins again.
+    """Return the latest checkpoint of a run; None where it has none yet, so that it begins again.
 
     Raises:
         CheckpointError: It is broken.

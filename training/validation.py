@@ -67,7 +67,7 @@ class TrainingTask(NamedTuple):
 def validation_task(
     options: TaskOptions, files: Sequence[str], learned: Scenario, training: TrainingTask
 ) -> TrainingTask:
-    """What a policy is validated in: world files of its own, or the worlds that it learns in.
+    """Return what a policy is validated in: world files of its own, or the worlds that it learns in.
 
     Args:
         options: Of the run, which say how the files are read.

@@ -236,7 +236,7 @@ def told_command(command: str, words: Sequence[str], leave_out: Sequence[str]) -
 
 
 def given_options(args: Any, leave_out: Sequence[str] = ()) -> list[str]:  # noqa: ANN401 - any dataclass
-    """The options that differ from their defaults as words of a command line; of paths, the file's name.
+    """Return options that differ from their defaults as words of a command line; of paths, the name.
 
     Args:
         args: A dataclass of options.

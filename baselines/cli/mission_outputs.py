@@ -204,7 +204,7 @@ class MissionLog:
         return written
 
     def _results(self) -> dict[str, np.ndarray]:
-        """What a record keeps for people: poses at all moments, and the team's map now."""
+        """Return what a record keeps for people: poses at all moments, and the team's map now."""
         recorder = self.recorder
         arrays = [recorder.time_s, recorder.poses]
         if recorder.missions.grid.voxels <= MOST_MAP_VOXELS:
@@ -213,7 +213,7 @@ class MissionLog:
         return dict(zip(RESULTS, arrays, strict=False))
 
     def _write_folder(self, folder: Path, figures: dict[str, Any]) -> list[Path]:
-        """The figures with their series, and the picture of curves and maps."""
+        """Return the figures with their series, and the picture of curves and maps."""
         from baselines.cli.mission_picture import mission_picture
 
         recorder = self.recorder

@@ -127,7 +127,7 @@ def _sent(recorder: Recorder) -> tuple[np.ndarray, str, str]:
 
 
 def _draw_entropies(axes: Axes, recorder: Recorder) -> None:
-    """The entropy of each robot's map over time, and the threshold that ends the mission."""
+    """Draw the entropy of each robot's map over time, and the threshold that ends the mission."""
     robots = recorder.missions.scenario.robots
     for robot in range(robots):
         axes.step(
@@ -170,7 +170,7 @@ def _maps(recorder: Recorder) -> tuple[_Map, _Map, _Map]:
 
 
 def _maps_from_above(recorder: Recorder, true_m: np.ndarray) -> tuple[_Map, _Map, _Map]:
-    """The same three maps of ground whose true heights (X, Y) are given, in metres."""
+    """Return the same three maps of ground whose true heights (X, Y) are given, in metres."""
     missions = recorder.missions
     scenario, grid = missions.scenario, missions.grid
     share = np.ma.masked_array(entropy_share(missions, 0, 0).mean(axis=2))

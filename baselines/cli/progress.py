@@ -23,7 +23,7 @@ LINE_EVERY_S = 15.0
 
 @contextmanager
 def progress_bar(title: str, hidden: bool) -> Iterator[Callable[[EntropyExploreEnv], None]]:
-    """A bar that is there from the first call of the function given, to be called after every step.
+    """Yield a bar that is there from the first call of the function given, to be called after every step.
 
     Where standard error is no terminal, a line now and then stands in its place.
     """
@@ -127,13 +127,13 @@ def _setting(scenario: Scenario) -> Iterator[tuple[str, str]]:
 
 
 def _told(faults: dict[str, int]) -> str | None:
-    """What faults did, in words; None where there are none."""
+    """Return what faults did, in words; None where there are none."""
     said = [f"{count:,} {name.replace('_', ' ')}" for name, count in faults.items() if count]
     return ("\n".join(said) or "none happened") if faults else None
 
 
 def standing_still(figures: dict[str, Any], moved_m: float) -> list[str]:
-    """A warning of each robot that drove less than `moved_m` and was blocked, or did not finish the map.
+    """Return warnings of robots that drove less than `moved_m` and were blocked or did not finish the map.
 
     In a room without obstacles a robot may well map all from where it starts, and a mission of a few scans
     says nothing.
@@ -149,7 +149,7 @@ def standing_still(figures: dict[str, Any], moved_m: float) -> list[str]:
 
 
 def _moved_m(scenario: Scenario) -> float:
-    """What a robot that maps a world drives at least: a metre, its body's length twice, or a voxel."""
+    """Return what a robot that maps a world drives at least: a metre, its body's length twice, or a voxel."""
     lengths_m = (2 * kind.robot.body_radius_m for kind in scenario.kinds)
     return max(_MOVED_M, 2 * max(lengths_m), scenario.grid.voxel_size_m)
 

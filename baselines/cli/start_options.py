@@ -34,7 +34,7 @@ def reset_options(starts: str | None, world_number: int | None, scenario: Scenar
 
 
 def given_json(option: str, given: str, allowed: str) -> Any:  # noqa: ANN401 - whatever the text holds
-    """What a text of JSON (it begins with a bracket), or the file of this name, holds.
+    """Return what a text of JSON (it begins with a bracket), or the file of this name, holds.
 
     Raises:
         SettingError: It is neither.
@@ -52,7 +52,7 @@ def given_json(option: str, given: str, allowed: str) -> Any:  # noqa: ANN401 - 
 
 
 def _full_pose(scenario: Scenario, robot: int, pose: list[Any]) -> list[Any]:
-    """A pose of five numbers; [x, y, yaw] is that of a planar robot in its plane, level."""
+    """Return a pose of five numbers; [x, y, yaw] is that of a planar robot in its plane, level."""
     if len(pose) != 3 or robot >= scenario.robots:
         return pose
     plane_m = scenario.plane_m(robot)

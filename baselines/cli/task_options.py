@@ -105,7 +105,7 @@ class BaseTask(NamedTuple):
     """That a file of settings asks for; None = as soon as a robot has to decide."""
 
     def defaults(self, settings: str | None = None) -> TaskOptions:
-        """The options whose values are the task's own."""
+        """Return the options whose values are the task's own."""
         scenario = self.scenario
         return TaskOptions(
             settings=settings,
@@ -125,7 +125,7 @@ def base_task(
     settings: str | None = None,
     own: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
 ) -> BaseTask:
-    """The named scenario with the settings of a file, or the scenario that the file holds as a whole.
+    """Return the named scenario with the settings of a file, or the scenario that the file holds as a whole.
 
     Args:
         name: Of a scenario, or a Scenario.
@@ -157,7 +157,7 @@ def is_whole_scenario(settings: str | None) -> bool:
 
 
 def _settings_in(file: str) -> Mapping[str, Any]:
-    """The object of settings in a file, or in a text that is one."""
+    """Return the object of settings in a file, or in a text that is one."""
     allowed = "a file with a scenario's settings as JSON"
     try:
         inline = file.lstrip().startswith("{")
@@ -174,7 +174,7 @@ def _settings_in(file: str) -> Mapping[str, Any]:
 
 
 def _merged(settings: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings with some changed, in parts too."""
+    """Return settings with some changed, in parts too."""
     merged = dict(settings)
     for name, value in changes.items():
         inner = merged.get(name)
@@ -225,7 +225,7 @@ def options_for(task: BaseTask, options: TaskOptions, words: Sequence[str]) -> T
 def tasked(
     scenario: Scenario, options: TaskOptions, robots: int | None = None
 ) -> tuple[Scenario, Surroundings]:
-    """The scenario with the options of a command line, and what of a mission is no setting of it.
+    """Return the scenario with the options of a command line, and what of a mission is no setting of it.
 
     Args:
         scenario: What to start from.
@@ -266,12 +266,12 @@ def _kinds(words: str) -> tuple[RobotKind, ...]:
 
 
 def limit_s(options: TaskOptions) -> float:
-    """Simulated seconds after which a mission is cut off."""
+    """Return simulated seconds after which a mission is cut off."""
     return options.ending.time_limit_s if options.time_limit_s is None else options.time_limit_s
 
 
 def worlds_of(options: TaskOptions, files: Sequence[str] | None = None) -> dict[str, Any]:
-    """Settings of an environment in the world files of a task, and how much memory reading them may take.
+    """Return settings of an environment in the world files of a task; limit the memory that reading takes.
 
     Args:
         options: Of the command.
@@ -289,7 +289,7 @@ def worlds_of(options: TaskOptions, files: Sequence[str] | None = None) -> dict[
 
 
 def settled(options: TaskOptions) -> TaskOptions:
-    """The same options wherever and whenever they are read: absolute paths, files of JSON as texts.
+    """Return the same options wherever and whenever they are read: absolute paths, files of JSON as texts.
 
     Raises:
         SettingError: A file does not hold what it should.

@@ -46,12 +46,12 @@ class Reading:
     """MiB of memory that reading may take; default: by the file's size."""
 
     def asked(self) -> dict[str, Any]:
-        """What was asked for."""
+        """Return what was asked for."""
         fields = dataclasses.asdict(self)
         return {name: value for name, value in fields.items() if value is not None and value is not False}
 
     def options(self) -> dict[str, Any]:
-        """The same by the names of `load_world`."""
+        """Return the same by the names of `load_world`."""
         options = self.asked()
         if options.pop("hollow", False):
             options["fill"] = False
@@ -59,7 +59,7 @@ class Reading:
 
 
 def world_settings(worlds: Sequence[str], voxel_size_m: float | None, reading: Reading) -> dict[str, Any]:
-    """Settings of an environment in world files; what JSON holds.
+    """Return settings of an environment in world files; what JSON holds.
 
     Args:
         worlds: The files; none = the scenario's own world.

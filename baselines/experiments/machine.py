@@ -6,5 +6,5 @@ from cpuinfo import get_cpu_info
 
 
 def processor() -> str:
-    """The processor's name, as the system tells it."""
+    """Return the processor's name, as the system tells it."""
     return get_cpu_info().get("brand_raw") or "unknown"

@@ -53,13 +53,13 @@ class Surroundings:
         return {**(json.loads(self.worlds) if self.worlds else {}), **fixed}
 
     def files(self) -> list[Path]:
-        """The world files."""
+        """Return the world files."""
         world = self.settings().get("world", [])
         paths = world["path"] if isinstance(world, dict) else world
         return [Path(path) for path in ([paths] if isinstance(paths, str) else paths)]
 
     def without_folders(self) -> Surroundings:
-        """The same, wherever the world files lie."""
+        """Return the same, wherever the world files lie."""
         if not self.worlds:
             return self
         worlds, names = json.loads(self.worlds), [path.name for path in self.files()]
@@ -71,7 +71,7 @@ class Surroundings:
 
 
 def scripted(scenario: Scenario, decision_period_s: float | None = None) -> Scenario:
-    """The scenario as scripted strategies run it: no observation, steps until a decision or of a length."""
+    """Return a scenario as scripted strategies run it: no observation, steps to a decision or of a length."""
     return with_settings(scenario, {"decision_period_s": decision_period_s, "observation": NOTHING_OBSERVED})
 
 
@@ -80,7 +80,7 @@ def scripted_env(
     surroundings: Surroundings | None = None,
     **settings: Any,  # noqa: ANN401 - whatever a setting may be
 ) -> EntropyExploreEnv:
-    """An environment for scripted strategies.
+    """Return an environment for scripted strategies.
 
     Args:
         scenario: The task.
@@ -161,7 +161,7 @@ class Followed(Driver):
 
 
 def _idle_action(env: EntropyExploreEnv, agent: str) -> np.ndarray | np.int64:
-    """An action for a robot that is busy: it is ignored."""
+    """Return an action for a robot that is busy: it is ignored."""
     space = env.action_space(agent)
     return np.zeros(space.shape, np.float32) if space.shape else np.int64(0)
 

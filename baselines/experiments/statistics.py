@@ -101,7 +101,7 @@ def geometric_ratio_interval(ours: Sequence[Sample], theirs: Sequence[Sample]) -
 def interpolated_ratio_interval(
     times: np.ndarray, costs: np.ndarray, time: np.ndarray, cost: np.ndarray
 ) -> Interval:
-    """A curve of mean times over mean costs, read at a cost, over the mean time paid there; its interval.
+    """Return a curve of mean times over mean costs, read at a cost, over the time paid there; its interval.
 
     Beyond the curve's ends its nearest point is read.
 

@@ -12,7 +12,7 @@ _ROW = DataRow("| ", " | ", " |")
 
 
 def _rule(widths: Sequence[int], alignments: Sequence[str]) -> str:
-    """The line below the head."""
+    """Return the line below the head."""
     del alignments
     return "| " + " | ".join("---" for _ in widths) + " |"
 
@@ -31,7 +31,7 @@ _MARKDOWN = TableFormat(
 
 
 def markdown_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """A Markdown table; cells stand in it as `str` has them."""
+    """Return a Markdown table; cells stand in it as `str` has them."""
     text = tabulate(rows, head, _MARKDOWN, disable_numparse=True, stralign=None, numalign=None)
     return text + "\n"
 

@@ -43,13 +43,13 @@ class RecordedEnv(EntropyExploreEnv):
 
 
 def observed_scenario(scenario: Scenario, observation: Observation) -> Scenario:
-    """The scenario of scripted strategies with these observations, flat, of robots that decide."""
+    """Return the scenario of scripted strategies with these observations, flat, of robots that decide."""
     seen = with_settings(scripted(scenario), {"observation": observation})
     return with_settings(seen, {"observation": {"flat": True, "while_busy": False}})
 
 
 def recorded_env(scenario: Scenario, surroundings: Surroundings) -> RecordedEnv:
-    """An environment for recording.
+    """Return an environment for recording.
 
     Args:
         scenario: Of `observed_scenario`.
@@ -104,7 +104,7 @@ def record_mission(env: RecordedEnv, strategy: str, seed: int, keep: Callable[[R
 
 
 def _last_row(env: RecordedEnv, seed: int, step: int, robot: int, agent: str) -> Row:
-    """What a robot observes at the mission's end, from which it decides nothing."""
+    """Return what a robot observes at the mission's end, from which it decides nothing."""
     row: Row = {"mission": seed, "step": step, "robot": robot, "time_s": _time_s(env)}
     row |= {"decided": False, "observation": env.observed[agent].copy(), "action": None}
     _, terminations, truncations = env.returned

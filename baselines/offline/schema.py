@@ -45,7 +45,7 @@ def columns(scenario: Scenario) -> list[tuple[str, pa.DataType]]:
 
 
 def schema_of(scenario: Scenario, strategy: str) -> pa.Schema:
-    """The schema of a file, with its metadata.
+    """Return the schema of a file, with its metadata.
 
     Args:
         scenario: With flat observations.

@@ -152,5 +152,5 @@ def _takes_one(function: Callable[..., Any]) -> bool:
 
 
 def _said(error: BaseException) -> str:
-    """An error's kind and message in one line."""
+    """Return an error's kind and message in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split())

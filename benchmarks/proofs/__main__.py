@@ -144,12 +144,12 @@ def _play_all(name: str, args: Args) -> Played:
 
 
 def again(name: str, number: int) -> str:
-    """The line that plays a case again."""
+    """Return the line that plays a case again."""
     return f"python -m benchmarks.proofs {name} --cases 1 --first {number}"
 
 
 def table(played: dict[str, Played]) -> str:
-    """A row for each proof, and for each group of its cases, as Markdown."""
+    """Return a row for each proof, and for each group of its cases, as Markdown."""
     rows = []
     for name, each in played.items():
         groups = [group for group in dict.fromkeys(found.of for found in each.found) if group]
@@ -161,7 +161,7 @@ def table(played: dict[str, Played]) -> str:
 
 
 def told(found: Sequence[Found]) -> str:
-    """The figures of some cases: sums, and the largest of those whose name ends with "at most"."""
+    """Return the figures of some cases: sums, and the largest of those whose name ends with "at most"."""
     values: dict[str, list[float]] = {}
     for each in found:
         for name, value in each.figures.items():
@@ -173,7 +173,7 @@ def told(found: Sequence[Found]) -> str:
 
 
 def page(played: dict[str, Played], words: Sequence[str]) -> str:
-    """The page of results; its text is in `page.md.j2`."""
+    """Return the page of results; its text is in `page.md.j2`."""
     folder = Path(__file__).parent
     failures = [
         (again(name, number), said)

@@ -51,7 +51,7 @@ def play(number: int) -> Found:
 
 @cache
 def _digests(first: int, variant: tuple[str, int, int]) -> list[str]:
-    """The digests of some scenarios, played in a fresh process."""
+    """Return the digests of some scenarios, played in a fresh process."""
     processor, threads, missions = variant
     hash_seed = (first + len(processor) + 10 * threads + missions) % 2**32
     variables = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "PYTHONHASHSEED": str(hash_seed)}
@@ -78,7 +78,7 @@ def print_digests(first: int, threads: int, missions: int) -> None:
 
 
 def digest_of(number: int, threads: int, missions: int) -> str:
-    """The digest of the first of some missions in a drawn scenario; the others are other episodes."""
+    """Return the digest of the first of some missions in a drawn scenario; the others are other episodes."""
     drawn = next(drawn for draw in itertools.count() if (drawn := allowed(number, draw)) is not None)
     team = Missions(drawn.scenario, missions, threads, drawn.given)
     team.reset_some(range(missions), [number] * missions)
@@ -93,7 +93,7 @@ def digest_of(number: int, threads: int, missions: int) -> str:
 
 
 def allowed(number: int, draw: int) -> Drawn | None:
-    """A drawn scenario, if it is allowed and its first mission has room."""
+    """Return a drawn scenario, if it is allowed and its first mission has room."""
     try:
         drawn = draw_scenario(np.random.default_rng([number, draw, 1]), few_kernels=True)
         Missions(drawn.scenario, given=drawn.given).reset(0, number)

@@ -275,7 +275,7 @@ def _value(rng: np.random.Generator, drawn: Numbers | Sequence[Any], usual: bool
 
 
 def _grid(rng: np.random.Generator) -> Grid:
-    """A small grid, flat in a third of the cases; its voxels of any size."""
+    """Return a small grid, flat in a third of the cases; its voxels of any size."""
     while True:
         x, y, z = (int(n) for n in np.exp(rng.uniform(0.0, math.log(60.0), 3)).astype(int))
         z = 1 if rng.random() < 0.33 else z
@@ -288,7 +288,7 @@ def _grid(rng: np.random.Generator) -> Grid:
 
 
 def _sensor(rng: np.random.Generator, part: Callable[..., Any]) -> RangeSensor:
-    """A sensor with up to some hundred rays."""
+    """Return a sensor with up to some hundred rays."""
     yaw, pitch = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(0.0, math.pi)
     view = [(yaw, pitch), (2.0 * math.pi, pitch), (yaw, 0.0), (0.0, 0.0)][int(rng.integers(4))]
     step = max(max(view) / rng.integers(1, _MOST_RAYS_ACROSS), 1e-6)
@@ -326,7 +326,7 @@ def _fiducials(rng: np.random.Generator, part: Callable[..., Any], grid: Grid) -
 
 
 def _channel(part: Callable[..., Any], faulty: bool, few_kernels: bool) -> Channel:
-    """A channel; with few kernels it reaches by more than distance where there are faults, and only there."""
+    """Return a channel; with few kernels it reaches by more than distance only where there are faults."""
 
     def fitting(**drawn: Any) -> Channel:  # noqa: ANN401 - whatever a setting is
         if drawn["burst"] == 0 or (few_kernels and not faulty):

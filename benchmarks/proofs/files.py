@@ -114,7 +114,7 @@ def play(number: int) -> Found:
 
 @cache
 def _reader() -> ReaderProcess:
-    """The process that reads all worlds of this process."""
+    """Return the process that reads all worlds of this process."""
     reader = ReaderProcess()
     atexit.register(reader.close)
     return reader
@@ -249,7 +249,7 @@ def _read(form: Files, folder: Path, reader: ReaderProcess | None, reads: Reads)
 
 
 def _peak_mib() -> float:
-    """The most resident memory that this process ever held; 0 where the system does not tell."""
+    """Return the most resident memory that this process ever held; 0 where the system does not tell."""
     if resource is None:
         return 0.0
     unit = 2**20 if sys.platform == "darwin" else 2**10  # macOS counts bytes, Linux KiB

@@ -19,7 +19,7 @@ _SIZES = (b"0", b"-1", b"65536", b"2147483647", b"4294967295", b"999999999999999
 
 
 def absurd_text(data: bytes, rng: np.random.Generator) -> bytes:
-    """A number in the text becomes an absurd one."""
+    """Return a number in the text becomes an absurd one."""
     numbers = list(re.finditer(rb"-?\d+(\.\d+)?", data[:2048]))
     if not numbers:
         return flipped(data, rng)
@@ -36,7 +36,7 @@ def absurd_binary(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 def _archive(members: dict[str, bytes]) -> bytes:
-    """A compressed archive, the same at any time."""
+    """Return a compressed archive, the same at any time."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in members.items():
@@ -45,13 +45,13 @@ def _archive(members: dict[str, bytes]) -> bytes:
 
 
 def _array(kind: str, shape: tuple[int, int], content: bytes) -> bytes:
-    """A NumPy file that says this type and shape, whatever its content."""
+    """Return a NumPy file that says this type and shape, whatever its content."""
     head = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117).encode() + b"\n"
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head + content
 
 
 def nested(data: bytes, rng: np.random.Generator) -> bytes:
-    """An archive with the file in it, in an archive, in an archive."""
+    """Return an archive with the file in it, in an archive, in an archive."""
     for _ in range(int(rng.integers(1, 4))):
         data = _archive({"elevation.npy" if rng.random() < 0.5 else "../../elevation.npy": data})
     return data
@@ -94,7 +94,7 @@ def repaired_png(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 def repaired_zip(data: bytes, rng: np.random.Generator) -> bytes:
-    """Changed arrays in a sound archive; a bomb of zeros; a pickle that would write a file."""
+    """Return changed arrays in a sound archive; a bomb of zeros; a pickle that would write a file."""
     if not data.startswith(b"PK"):
         return overwritten(data, rng)
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -116,7 +116,7 @@ def repaired_zip(data: bytes, rng: np.random.Generator) -> bytes:
 
 @cache
 def _archive_of_zeros(data: bytes, name: str) -> bytes:
-    """An archive in which one array says that it is far larger than its content, which is zeros."""
+    """Return an archive in which one array says that it is far larger than its content, which is zeros."""
     edge = 20_000
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = {each: archive.read(each) for each in archive.namelist()}
@@ -164,7 +164,7 @@ def hostile_yaml(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 def hostile_glb(data: bytes, rng: np.random.Generator) -> bytes:
-    """References to files elsewhere, meshes repeated without end, accessors of absurd size."""
+    """Return references to files elsewhere, meshes repeated without end, accessors of absurd size."""
     if not data.startswith(b"glTF"):
         return absurd_binary(data, rng)
     which = int(rng.integers(3))

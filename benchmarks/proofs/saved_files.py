@@ -76,7 +76,7 @@ def another_value(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 def another_array(data: bytes, rng: np.random.Generator) -> bytes:
-    """An archive with one array of another shape or type, with other numbers, or gone."""
+    """Return an archive with one array of another shape or type, with other numbers, or gone."""
     try:
         with np.load(io.BytesIO(data)) as archive:
             arrays = dict(archive)
@@ -105,7 +105,7 @@ def another_array(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 def _other_numbers(array: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """An array of its shape and type, with bytes of another number throughout."""
+    """Return an array of its shape and type, with bytes of another number throughout."""
     number = (0.0, -1.0, 2.0**31, np.inf, np.nan)[int(rng.integers(5))]
     filled = np.full(array.size * array.itemsize // 8 + 1, number).tobytes()
     return np.frombuffer(filled[: array.size * array.itemsize], array.dtype).reshape(array.shape)
@@ -123,7 +123,7 @@ CHANGES: tuple[Change, ...] = (
 
 
 def record_files(folder: Path) -> Saved:
-    """The record of a short mission, with starts that were given."""
+    """Return the record of a short mission, with starts that were given."""
     env = EntropyExploreEnv(with_settings(BOX, {"channel": {"delay_s": 1.0}}))
     env.reset(seed=5)
     starts = env.missions.state.robots[0]["origin"].copy()
@@ -161,7 +161,7 @@ def _with_checksum(files: dict[str, bytes]) -> dict[str, bytes]:
 
 
 def checkpoint_files(folder: Path) -> Saved:
-    """A checkpoint of a small policy, with its trainer's state."""
+    """Return a checkpoint of a small policy, with its trainer's state."""
     import torch
 
     from training.advantages import Normaliser

@@ -97,7 +97,7 @@ def check(env: EntropyExploreEnv, observations: dict, rewards: dict, earlier_s: 
 
 
 def _outside(env: EntropyExploreEnv, agent: str) -> str:
-    """The numbers of an observation that its space does not have, with their places in the flat one."""
+    """Return the numbers of an observation that its space lacks, with their places in the flat one."""
     layout, robot = env.missions.layout, env.possible_agents.index(agent)
     seen = env.missions.observations[0, robot]
     within = (seen >= layout.low.astype(np.float32)) & (seen <= layout.high.astype(np.float32))

@@ -115,7 +115,7 @@ def missions_of(scenario: Scenario) -> int:
 
 
 def _moment(env: EntropyExploreVectorEnv) -> tuple[np.ndarray, np.ndarray]:
-    """Copies of the records of missions (E,) and robots (E, A)."""
+    """Return copies of the records of missions (E,) and robots (E, A)."""
     state = env.missions.state
     return state.missions.copy(), state.robots.copy()
 

@@ -116,7 +116,7 @@ def _kill_one(name: str, words: tuple[str, ...], run: Path, moments: random.Rand
 
 
 def _started(name: str, words: tuple[str, ...], said: Any) -> subprocess.Popen[Any]:  # noqa: ANN401 - a file
-    """A trainer in a process group of its own."""
+    """Return a trainer in a process group of its own."""
     here = importlib.util.find_spec(TRAINERS[name].needs) is not None
     python = sys.executable if here else str(_ROOT / ".venv-rllib" / "bin" / "python")
     return subprocess.Popen(

@@ -30,22 +30,22 @@ def plan(rows: int = 7, columns: int = 11, seed: int = 0) -> np.ndarray:
 
 
 def sketch() -> np.ndarray:
-    """A plan with nothing unknown, as it is read without a YAML."""
+    """Return a plan with nothing unknown, as it is read without a YAML."""
     return np.where(plan() == 205, 254, plan()).astype(np.uint8)
 
 
 def pgm(shades: np.ndarray) -> bytes:
-    """A PGM of (rows, columns) uint8 shades."""
+    """Return a PGM of (rows, columns) uint8 shades."""
     return b"P5\n%d %d\n255\n" % (shades.shape[1], shades.shape[0]) + shades.tobytes()
 
 
 def png(pixels: np.ndarray) -> bytes:
-    """A PNG of these pixels."""
+    """Return a PNG of these pixels."""
     return image(pixels, "PNG")
 
 
 def image(pixels: np.ndarray, kind: str) -> bytes:
-    """An image of these pixels, of a kind by Pillow's name."""
+    """Return an image of these pixels, of a kind by Pillow's name."""
     from PIL import Image
 
     buffer = io.BytesIO()
@@ -54,7 +54,7 @@ def image(pixels: np.ndarray, kind: str) -> bytes:
 
 
 def octomap_bytes(suffix: str) -> bytes:
-    """An OctoMap tree, `.bt` or `.ot`."""
+    """Return an OctoMap tree, `.bt` or `.ot`."""
     import octomap
 
     tree = octomap.OcTree(0.2)
@@ -74,7 +74,7 @@ def points(count: int = 60) -> np.ndarray:
 
 
 def pcd(encoding: str) -> bytes:
-    """A PCD of `points`."""
+    """Return a PCD of `points`."""
     from pypcd4.pypcd4 import Encoding, PointCloud
 
     buffer = io.BytesIO()
@@ -92,7 +92,7 @@ def ply(binary: bool) -> bytes:
 
 
 def las(compressed: bool) -> bytes:
-    """A laser scan of `points`, `.las` or `.laz`."""
+    """Return a laser scan of `points`, `.las` or `.laz`."""
     import laspy
 
     scan = laspy.create(point_format=3, file_version="1.4")
@@ -104,7 +104,7 @@ def las(compressed: bool) -> bytes:
 
 
 def mesh(kind: str) -> bytes:
-    """A box and a ramp in a format of trimesh."""
+    """Return a box and a ramp in a format of trimesh."""
     import trimesh
 
     box = trimesh.creation.box(bounds=[[0, 0, 0], [2, 3, 1]])
@@ -122,14 +122,14 @@ def heights(rows: int = 11, columns: int = 7) -> np.ndarray:
 
 
 def esri_grid() -> bytes:
-    """An ESRI ASCII grid of `heights`, by hand."""
+    """Return an ESRI ASCII grid of `heights`, by hand."""
     rows = heights()
     head = f"ncols {rows.shape[1]}\nnrows {rows.shape[0]}\nxllcorner 100\nyllcorner 200\ncellsize 1\n"
     return (head + "\n".join(" ".join(f"{height:.3f}" for height in row) for row in rows)).encode()
 
 
 def npz(**arrays: Any) -> bytes:  # noqa: ANN401 - whatever an archive may hold
-    """A NumPy archive of these arrays."""
+    """Return a NumPy archive of these arrays."""
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()
@@ -143,7 +143,7 @@ def geotiff(
     directory: tuple[int, ...] | None = None,
     **more: Any,  # noqa: ANN401 - options of tifffile
 ) -> bytes:
-    """A GeoTIFF of (rows, columns) heights; its tags of place, and its directory of keys, may be empty."""
+    """Return a GeoTIFF of (rows, columns) heights; its tags of place and its keys may be empty."""
     import tifffile
 
     keys = (1, 1, 0, 1, 1024, 0, 1, model) if directory is None else directory
@@ -156,7 +156,7 @@ def geotiff(
 
 
 def saved_world() -> bytes:
-    """A world of this library, with a ceiling."""
+    """Return a world of this library, with a ceiling."""
     from entropy_explore_env.settings.grid import Grid
     from entropy_explore_env.worlds.load import save_world
     from entropy_explore_env.worlds.world import World
@@ -170,7 +170,7 @@ def saved_world() -> bytes:
 
 
 def glb_of_json(gltf: dict[str, Any], blob: bytes = b"") -> bytes:
-    """A GLB with this JSON, for what no writer would write."""
+    """Return a GLB with this JSON, for what no writer would write."""
     text = json.dumps(gltf).encode()
     text += b" " * (-len(text) % 4)
     body = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(blob), 0x004E4942) + blob

@@ -9,7 +9,7 @@ class NearestUnknown:
     """Any class with `reset` and `choose` is a strategy; it is made without arguments."""
 
     def reset(self, scenario, rng):
-        """A new mission begins: its public settings, and a generator for the strategy's own draws."""
+        """Begin a mission: its public settings, and a generator for the strategy's own draws."""
         self._unknown = 1.1 * scenario.sigma_prior**-2  # 1/σ² of a voxel that was hardly ever measured
         self._rng = rng
 

@@ -13,7 +13,7 @@ _NOT_TEXT = (".. ", ":", "- ", "* ")
 
 
 def mark_literal(lines: list[str]) -> list[str]:
-    """A docstring's lines, with `::` before each indented block that follows a paragraph of text.
+    """Return a docstring's lines, with `::` before each indented block that follows a paragraph of text.
 
     Args:
         lines: reStructuredText without indentation of its own.

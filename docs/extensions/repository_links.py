@@ -13,7 +13,7 @@ _LINK = re.compile(r"(?<!!)\[((?:[^\[\]]|\[[^\]]*\])*)\]\((\.\./[^)\s]*)\)")
 
 
 def to_repository(text: str, page: str, url: str) -> str:
-    """A page's text whose links out of `docs/` are addresses.
+    """Return a page's text whose links out of `docs/` are addresses.
 
     Args:
         text: Markdown.

@@ -23,7 +23,7 @@ from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import COST_PER_S_ALONE, SCENARIOS
 from entropy_explore_env.worlds.load import make_world
 from entropy_explore_env.worlds.pictures import picture
-from entropy_explore_env.worlds.recipes.catalogue import RECIPES
+from entropy_explore_env.worlds.recipes.catalogue import RECIPES, about_recipe
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -104,7 +104,7 @@ These pages are written from the code when the site is built.
 
 
 def card(scenario: Scenario, docs: Path) -> str:
-    """The page of a scenario, Markdown.
+    """Return the page of a scenario, Markdown.
 
     Args:
         scenario: One of SCENARIOS.
@@ -134,7 +134,7 @@ def card(scenario: Scenario, docs: Path) -> str:
 
 
 def _mission(scenario: Scenario) -> str:
-    """The command that runs a mission, by the strategy that is recommended there."""
+    """Return the command that runs a mission, by the strategy that is recommended there."""
     name, strategy = scenario.name, recommended(scenario.name)
     called = f"`{resolved(strategy)}`" + (f" (`{strategy}`)" if resolved(strategy) != strategy else "")
     team = counted(scenario.robots, "robot")
@@ -146,7 +146,7 @@ def _mission(scenario: Scenario) -> str:
 
 
 def _about(name: str) -> str:
-    """What scenarios.py says below the scenario."""
+    """Return what scenarios.py says below the scenario."""
     texts = constant_docs(scenarios)
     named = {getattr(scenarios, key).name: text for key, text in texts.items() if _is_scenario(key)}
     return named[name]
@@ -157,7 +157,7 @@ def _is_scenario(name: str) -> bool:
 
 
 def table(head: list[str], rows: Iterable[Iterable[object]]) -> str:
-    """A Markdown table whose cells may hold any text."""
+    """Return a Markdown table whose cells may hold any text."""
     lines = [head, ["---"] * len(head), *([str(cell).replace("|", "\\|") for cell in row] for row in rows)]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
@@ -170,7 +170,7 @@ def _world(scenario: Scenario) -> str:
     voxels = f"{x} × {y} × {z} = {grid.voxels:,} of {grid.voxel_size_m:g} m" + (
         ", one layer: 2-D" if z == 1 else ""
     )
-    first = (recipe.__doc__ or "").partition("\n\n")[0]
+    first = about_recipe(scenario.world)
     file = f"entropy_explore_env/{recipe.__module__.partition('.')[2].replace('.', '/')}.py"
     robots = f"{scenario.robots}" + (
         f", of {len(scenario.kinds)} kinds in turn" if scenario.extra_kinds else ""
@@ -190,7 +190,7 @@ def _world(scenario: Scenario) -> str:
 
 
 def _kind_rows(kind: RobotKind) -> list[list[str]]:
-    """What a kind of robot is, and what it senses with."""
+    """Return what a kind of robot is, and what it senses with."""
     robot, sensor = kind.robot, kind.sensor
     moves = "drives on the ground" if robot.motion == "planar" else "flies"
     reach = "as far as the workspace" if math.isinf(robot.reach_m) else f"up to {robot.reach_m:g} m"
@@ -267,7 +267,7 @@ def _observation(scenario: Scenario) -> str:
 
 
 def _reward(scenario: Scenario) -> str:
-    """What a step is worth."""
+    """Return what a step is worth."""
     reward = scenario.reward
     gained = "own bits" if reward.kind == "individual" else "mean over the team of own and received bits"
     cost = f" - {reward.cost_per_s:g} × seconds" if reward.cost_per_s else ""
@@ -355,7 +355,7 @@ def _default(field: dataclasses.Field) -> object:
 
 
 def _value(value: object) -> str:
-    """A setting as one types it; angles and other long numbers to six digits."""
+    """Return a setting as one types it; angles and other long numbers to six digits."""
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, tuple):
@@ -366,21 +366,21 @@ def _value(value: object) -> str:
 
 
 def _changes(part: Any) -> str:  # noqa: ANN401 - any settings
-    """A part of a part as one makes it, with the fields that differ from their defaults."""
+    """Return a part of a part as one makes it, with the fields that differ from their defaults."""
     fields = [f for f in dataclasses.fields(part) if getattr(part, f.name) != _default(f)]
     words = ", ".join(f"{f.name}={getattr(part, f.name)!r}" for f in fields)
     return f"{type(part).__name__}({words})"
 
 
 def _film(name: str, docs: Path) -> str:
-    """The film of a mission, if there is one, and who acts in it if that is not whom we recommend."""
+    """Return the film of a mission, if there is one, and who acts in it if that is not whom we recommend."""
     if not (docs / FILMS / f"{name}.webp").exists():
         return ""
     return f"![A mission in {name}](../{FILMS}/{name}.webp)\n"
 
 
 def _versions(name: str) -> str:
-    """The history of the id."""
+    """Return the history of the id."""
     now = environment_id(name)
     rows = [
         [f"`{now}`", "0.2.0; what alters results since 0.1.0 stands in the [changelog](../changelog.md)"],

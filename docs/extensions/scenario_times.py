@@ -27,7 +27,7 @@ class Time(NamedTuple):
 
 
 def times_table(scenario: Scenario, results: Path) -> str:
-    """The section of a scenario's page; empty where nothing was measured.
+    """Return the section of a scenario's page; empty where nothing was measured.
 
     Args:
         scenario: One of the named scenarios.

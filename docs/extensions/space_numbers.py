@@ -60,7 +60,7 @@ class _Told(NamedTuple):
 
 
 def _relative_pose(of: str) -> list[_Told]:
-    """The seven numbers of a pose as another robot's observation tells it."""
+    """Return the seven numbers of a pose as another robot's observation tells it."""
     places = [
         _Told(1, f"{of}: how far away along {axis}, in sizes of the workspace", "share") for axis in "xyz"
     ]
@@ -98,7 +98,7 @@ def observation_numbers(scenario: Scenario) -> dict[str, PartNumbers]:
 
 
 def _part_numbers(name: str, part: Part, scenario: Scenario) -> PartNumbers:
-    """A part's numbers, with their indices and the bounds of their space."""
+    """Return a part's numbers, with their indices and the bounds of their space."""
     high = np.broadcast_to(part.high, part.shape).ravel()
     rows = part.shape[0] if name in ("team", "candidates") else 1
     numbers: list[Numbers] = []
@@ -113,7 +113,7 @@ def _part_numbers(name: str, part: Part, scenario: Scenario) -> PartNumbers:
 
 
 def _told(name: str, part: Part, scenario: Scenario) -> list[_Told]:
-    """What is said of a part's numbers, or of those of one of its rows."""
+    """Return what is said of a part's numbers, or of those of one of its rows."""
     cells = math.prod(part.shape[1:])
     if name == "panorama":
         unit = "log2(1 + bits)" if scenario.observation.panorama_utility == "log2" else "bits"
@@ -150,7 +150,7 @@ def _told(name: str, part: Part, scenario: Scenario) -> list[_Told]:
 
 
 def _own_state(kinds: int) -> list[_Told]:
-    """The part `self`."""
+    """Return the part `self`."""
     told = [
         _Told(1, f"{axis} in the workspace: -1 at its lower edge, 1 at its upper one", "share")
         for axis in "xyz"
@@ -167,7 +167,7 @@ def _own_state(kinds: int) -> list[_Told]:
 
 
 def _teammate() -> list[_Told]:
-    """A row of the part `team`."""
+    """Return a row of the part `team`."""
     return [
         _Told(1, "1 if the teammate was ever heard; the next eight are 0 until then", "-", 0.0),
         *_relative_pose("where it was last heard"),
@@ -180,7 +180,7 @@ def _teammate() -> list[_Told]:
 
 
 def action_numbers(scenario: Scenario) -> list[Numbers]:
-    """The numbers of a continuous action, in their order."""
+    """Return the numbers of a continuous action, in their order."""
     unlimited = any(math.isinf(kind.robot.reach_m) for kind in scenario.kinds)
     if unlimited:
         told = [f"{axis} of the viewpoint in the workspace: -1 the first voxel, 1 the last" for axis in "xyz"]
@@ -199,7 +199,7 @@ def action_numbers(scenario: Scenario) -> list[Numbers]:
 
 
 def _ignored_by(kinds: Iterable[bool]) -> str:
-    """What is said of a number of an action that means nothing to some kinds of robots."""
+    """Return what is said of a number of an action that means nothing to some kinds of robots."""
     ignored = list(kinds)
     if not any(ignored):
         return ""

@@ -176,7 +176,7 @@ class Board(NamedTuple):
 
 
 def _new_board(rows: int, columns: int) -> Board:
-    """An empty board of (X, Y) squares."""
+    """Return an empty board of (X, Y) squares."""
     shape = rows + 2, (columns + 3) // 2
     return Board(*(np.zeros(shape) for _ in range(4)))
 

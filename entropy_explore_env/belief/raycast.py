@@ -119,7 +119,7 @@ def longest_crossing(size_x, size_y, size_z, length, voxels_behind):
 
 @inlined_kernel
 def _axis(position, direction, size):
-    """The _AxisStart of a ray at `position` with a component `direction`, in a grid of `size` voxels."""
+    """Return the _AxisStart of a ray at `position` with a component `direction`, among `size` voxels."""
     index = min(max(int(position), 0), size - 1)  # inside: no need to call floor, which is slow
     if direction == 0.0:
         return _AxisStart(index, 0, _FAR_TICKS, _FAR_TICKS, _FAR_TICKS)
@@ -134,7 +134,7 @@ def _axis(position, direction, size):
 
 @inlined_kernel
 def _ticks(length):
-    """A distance in voxel edges as a whole number of ticks."""
+    """Return a distance in voxel edges as a whole number of ticks."""
     return int(min(length, _FAR) * TICKS + 0.5)
 
 
@@ -274,7 +274,7 @@ class _Walk(NamedTuple):
 
 @inlined_kernel
 def _begin_walk(size, line):
-    """The _Walk along a line, in the voxel in which it starts."""
+    """Return the _Walk along a line, in the voxel in which it starts."""
     x = _axis(line.start[0], line.direction[0], size[0])
     y = _axis(line.start[1], line.direction[1], size[1])
     z = _axis(line.start[2], line.direction[2], size[2])
@@ -359,7 +359,7 @@ def trace_two(size, first, second, behind, noted_first, noted_second):
 
 @inlined_kernel
 def cast_two_ranges(coverage, size, first, second, stop_above):
-    """What `cast_range` returns for each of two lines, walked in turns as by `trace_two`."""
+    """Return what `cast_range` returns for each of two lines, walked in turns as by `trace_two`."""
     one, other = _begin_walk(size, first), _begin_walk(size, second)
     until, other_until = min(one.leaves, one.stops), min(other.leaves, other.stops)
     voxel, at, faces = _next_voxel(one.voxel, one.steps, one.faces, one.gaps)

@@ -57,7 +57,7 @@ def compiling(name: str, folder: Path | None) -> Iterator[None]:
 
 
 def end_of_step() -> None:
-    """A mission has advanced: what it needs is compiled."""
+    """Say what was compiled, now that a mission has advanced."""
     if _progress.pending:
         _progress.pending = False
         number = len(_progress.compiled)
@@ -78,7 +78,7 @@ def explain_not_kept(folder: Path | None, error: OSError | None) -> None:
 
 
 def explain_no_stamp(reason: str) -> None:
-    """A kernel is compiled in each process; for those who wonder why."""
+    """Log why a kernel is compiled in each process."""
     logging.getLogger("entropy_explore_env.compilation").info("compiled kernel is not kept: %s", reason)
 
 
@@ -88,7 +88,7 @@ def _say(line: str) -> None:
 
 
 def short_path(folder: Path) -> str:
-    """A path that begins with ~ where it lies in the home folder."""
+    """Return a path that begins with ~ where it lies in the home folder."""
     try:
         return f"~/{folder.relative_to(Path.home()).as_posix()}"
     except (ValueError, RuntimeError):

@@ -101,7 +101,7 @@ def save(path: Path | None, sig: Any, result: Any) -> None:  # noqa: ANN401 - a 
 
 
 def _environment() -> list[str]:
-    """What else the code depends on."""
+    """Return what else the code depends on."""
     versions = (
         _COMPILED_BY,
         numba.__version__,
@@ -118,7 +118,7 @@ def _normal(sig: Any) -> Any:  # noqa: ANN401
 
 
 def _read(path: Path) -> bytes | None:
-    """What `_write` wrote; None where there is nothing, or something else."""
+    """Return what `_write` wrote; None where there is nothing, or something else."""
     try:
         content = path.read_bytes()
     except OSError:

@@ -129,7 +129,7 @@ _known_flags: dict[KernelFlags, KernelFlags] = {}
 
 
 def _shared_flags(flags: compiler.Flags) -> KernelFlags:
-    """The one object for these options."""
+    """Return the one object for these options."""
     own = KernelFlags(flags)
     return _known_flags.setdefault(own, own)
 
@@ -200,7 +200,7 @@ class CalleesFirst(AnalysisPass):
 
 
 def _survey(state: Any) -> list[tuple[InnerKernel, tuple[types.Type, ...]]]:  # noqa: ANN401 - as above
-    """Calls of other kernels, neither compiled nor on disk, whose types follow from what is known."""
+    """Return calls of other kernels, neither compiled nor on disk, whose types follow from what is known."""
     _state.found = {}
     try:
         type_inference_stage(
@@ -273,7 +273,7 @@ class InnerLowering(NativeLowering):
 
 
 def _rebuilt_inner(target_context: Any, reduced: tuple[Any, ...]) -> compiler.CompileResult:  # noqa: ANN401
-    """The inverse of `CompileResult._reduce` for an inner kernel."""
+    """Return the inverse of `CompileResult._reduce` for an inner kernel."""
     library, fndesc, environment, signature, objectmode, lifted, annotation, reload_init, environments = (
         reduced
     )

@@ -24,7 +24,7 @@ _PARTIAL = ".part"
 
 
 def kernel_folder() -> Path | None:
-    """The folder of compiled kernels: in `NUMBA_CACHE_DIR` if that is set, else in the user's cache folder.
+    """Return the folder of compiled kernels: in `NUMBA_CACHE_DIR`, or else in the user's cache folder.
 
     Returns:
         None where the system names no folder for the user.
@@ -62,7 +62,7 @@ def user_cache_folder(platform: str, environment: Mapping[str, str], home: Path 
 
 
 def partial_name(path: Path) -> Path:
-    """A name that no other process takes, for a file that is being written."""
+    """Return a name that no other process takes, for a file that is being written."""
     return path.with_name(f"{path.name}.{os.getpid()}-{time.monotonic_ns():x}{_PARTIAL}")
 
 

@@ -94,7 +94,7 @@ def _start() -> None:
 
 
 def _environment() -> dict[str, str]:
-    """The variables of this process, where it finds its modules and where it keeps kernels."""
+    """Return the variables of this process, where it finds its modules and where it keeps kernels."""
     modules = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)
     folder = getattr(config, "CACHE_DIR", "")
     return {**os.environ, "PYTHONPATH": modules, **({"NUMBA_CACHE_DIR": str(folder)} if folder else {})}

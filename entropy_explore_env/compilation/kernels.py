@@ -40,7 +40,7 @@ class InterpretedRecord(np.void):
     """An element of a structured array whose fields are attributes, those named as NumPy's own among them."""
 
     def __getattribute__(self, name: str) -> Any:  # noqa: ANN401 - whatever the field holds
-        """A field, or what NumPy calls so."""
+        """Return a field, or what NumPy calls so."""
         there = np.void.__getattribute__(self, "dtype").fields
         return self[name] if there and name in there else np.void.__getattribute__(self, name)
 
@@ -50,7 +50,7 @@ class InterpretedRecord(np.void):
 
 
 def record_type(fields: list[tuple[Any, ...]]) -> np.dtype[Any]:
-    """A structured type, aligned, whose elements have their fields as attributes, as kernels need.
+    """Return a structured type, aligned, whose elements have their fields as attributes, as kernels need.
 
     Compiled code reads any structured type so; where NUMBA_DISABLE_JIT=1 kernels are interpreted.
     """
@@ -73,7 +73,7 @@ Kernels that call it are kept on disk, it is not.
 
 
 def entry_point(compiled: Any, *arguments: Any) -> Callable[..., Any]:  # noqa: ANN401 - a kernel and its arguments
-    """The machine code of a kernel for arguments of these types, which does not check types.
+    """Return the machine code of a kernel for arguments of these types, which does not check types.
 
     For calls that happen every step: the call takes a tenth of the time. The caller makes sure that all later
     arguments have these types; others would be misread.

@@ -59,7 +59,7 @@ def forget_parts() -> None:
 
 
 def stamp(kernel: Dispatcher) -> str:
-    """A digest of the byte code, the options and the constants of a kernel and of all that it calls.
+    """Return a digest of the byte code, the options and the constants of a kernel and of all that it calls.
 
     Raises:
         NoStampError: It reaches something that cannot be described, or the globals of a kernel that it
@@ -145,7 +145,7 @@ class _Description:
                 self.add_value(value)
 
     def add_value(self, value: Any) -> None:  # noqa: ANN401 - of any global variable
-        """A constant of a kernel."""
+        """Add a constant of a kernel."""
         kind = type(value)
         if value is None or kind in (bool, int, float, complex, str, bytes):
             self._say(kind.__name__, repr(value))
@@ -177,7 +177,7 @@ class _Description:
             raise NoStampError(f"what {value!r} depends on is not known")
 
     def add_type(self, signature: Any) -> None:  # noqa: ANN401
-        """A type of Numba's, a tuple of them, or a signature."""
+        """Add a type of Numba's, a tuple of them, or a signature."""
         self._say(signature)
         if isinstance(signature, (tuple, list)):
             for inner in signature:
@@ -228,7 +228,7 @@ class _Description:
         self._say(hashlib.sha256(array.tobytes()).hexdigest())
 
     def _add_class(self, kind: type) -> None:
-        """A class that kernels know: NamedTuples, Enums, exceptions, types of numbers."""
+        """Add a class that kernels know: NamedTuples, Enums, exceptions, types of numbers."""
         self._say("class", kind.__module__, kind.__qualname__)
         if issubclass(kind, enum.Enum):
             for name, member in kind.__members__.items():
@@ -259,7 +259,7 @@ class _Description:
 
 
 def _origin(value: Any) -> str:  # noqa: ANN401
-    """The package that a function comes from, or the class of an object that is not a function."""
+    """Return the package that a function comes from, or the class of an object that is not a function."""
     own = getattr(value, "__module__", None)
     if isinstance(own, str) and hasattr(value, "__name__"):
         return own.partition(".")[0]

@@ -41,11 +41,11 @@ class ActionChecker:
         self.width = 1 if isinstance(space, spaces.Discrete) else int(space.shape[0])
 
     def one(self, name: str, action: object) -> tuple[np.ndarray, np.ndarray]:
-        """A single robot's action as ((1, N) float64, (1,) int64)."""
+        """Return a single robot's action as ((1, N) float64, (1,) int64)."""
         return self.batch([(name, action)])
 
     def batch(self, actions: Sequence[tuple[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
-        """A team's actions as arrays.
+        """Return a team's actions as arrays.
 
         Args:
             actions: (agent, action) in the order of the robots.
@@ -116,7 +116,7 @@ class ActionChecker:
 
 
 def as_array(name: str, action: object) -> np.ndarray:
-    """An array of whatever was given; what cannot be one is an ActionError."""
+    """Return an array of whatever was given; what cannot be one is an ActionError."""
     try:
         return np.asarray(action)
     except Exception:  # lists of different lengths, or an __array__ of somebody else's

@@ -76,7 +76,7 @@ def check_spaces(task: Task) -> None:
 
 
 def check_repeatable(task: Task) -> None:
-    """A seed gives the same episodes in a second environment, and again; other episodes start elsewhere."""
+    """Check that a seed gives the same episodes again, and that other episodes start elsewhere."""
     env = task.env()
     first = story(play(env, task))
     require_same("second environment", first, story(play(task.env(), task)))
@@ -99,7 +99,7 @@ def check_processes(task: Task) -> None:
 
 
 def _ask_child(task: Task, hash_seed: str) -> Leaves:
-    """The story of the task as a fresh process plays it; it imports from where this one does."""
+    """Return the story of the task as a fresh process plays it; it imports from where this one does."""
     path = os.pathsep.join(part or os.curdir for part in sys.path)
     variables = {**os.environ, "PYTHONPATH": path, "PYTHONHASHSEED": hash_seed}
     question = pickle.dumps((task.scenario, task.seed, task.given))
@@ -119,7 +119,7 @@ def answer_parent() -> None:
 
 
 def check_batches(task: Task) -> None:
-    """A VectorEnv of one or eight, on one or two threads, holds the missions of ParallelEnvs."""
+    """Check that a VectorEnv of one or eight, on one or two threads, holds the missions of ParallelEnvs."""
     calls, missions = play_batch(task, BATCH, threads=1)
     require_same(f"batch of {BATCH}, two threads", calls, play_batch(task, BATCH, threads=2)[0])
     require_same("batch of one", missions[0], play_batch(task, 1, threads=1)[1][0])
@@ -169,7 +169,7 @@ def row_of(result: tuple[Any, ...], mission: int) -> dict[str, Any]:
 
 
 def row_of_team(moment: dict[str, Any]) -> dict[str, Any]:
-    """A ParallelEnv's moment as `row_of` has it."""
+    """Return a ParallelEnv's moment as `row_of` has it."""
     infos, observations = (list(moment[name].values()) for name in ("infos", "observations"))
     rewards = list(moment.get("rewards", dict.fromkeys(moment["infos"], 0.0)).values())
     ends = [float(all(moment[name].values())) if name in moment else 0.0 for name in PARTS[2:4]]
@@ -184,7 +184,7 @@ def row_of_team(moment: dict[str, Any]) -> dict[str, Any]:
 
 
 def check_copies(task: Task) -> None:
-    """A pickled and a deep copy, taken in mid-episode, go on alike and apart from the original."""
+    """Check that pickled and deep copies, taken in mid-episode, continue alike, apart from the original."""
     first = [moment for moment, _ in play(task.env(), task) if "episode 0" in moment]
     half = len(first) // 2
     env = task.env()
@@ -203,14 +203,14 @@ def check_copies(task: Task) -> None:
 
 
 def _rest(env: EntropyExploreEnv, task: Task, step: int) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The rest of the first episode and the next one."""
+    """Yield the rest of the first episode and the next one."""
     yield from finish(env, task, 0, 0, step)
     yield "episode 1, step 0", named(env, env.reset())
     yield from finish(env, task, 0, 1)
 
 
 def check_fresh(task: Task) -> None:
-    """What a call returns is new, shares no memory with other calls, and is not changed by them."""
+    """Check that what a call returns shares no memory with other calls and is not changed by them."""
     returned = dict(play(task.env(), task))
     then = {where: leaves(parts) for where, parts in play(task.env(), task)}
     batch = task.vector_env(2)
@@ -241,7 +241,7 @@ def require_apart(returned: Mapping[str, object]) -> None:
 
 
 def check_busy(task: Task) -> None:
-    """What busy robots are told to do makes no difference."""
+    """Check that what busy robots are told to do makes no difference."""
     env, other = task.env(), task.env()
     infos = env.reset(task.seed)[1]
     other.reset(task.seed)
@@ -295,7 +295,7 @@ def check_conformance(
 
 
 def main(words: Sequence[str]) -> int:
-    """The command; returns its exit code: 0 all holds, 1 something does not."""
+    """Return the command; returns its exit code: 0 all holds, 1 something does not."""
     parser = LineParser("python -m entropy_explore_env conformance")
     parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario")
     parser.add_argument("--world", help="a world file in place of the scenario's world")

@@ -46,11 +46,11 @@ class Task:
     given: tuple[World, ...] = ()
 
     def env(self) -> EntropyExploreEnv:
-        """A new environment for the task."""
+        """Return a new environment for the task."""
         return EntropyExploreEnv(self.scenario, **self._world)
 
     def vector_env(self, missions: int, **how: Any) -> EntropyExploreVectorEnv:  # noqa: ANN401 - as the class's
-        """A new environment for so many missions."""
+        """Return a new environment for so many missions."""
         return EntropyExploreVectorEnv(self.scenario, missions, **how, **self._world)
 
     @property
@@ -63,7 +63,7 @@ class Task:
         return action_count(self.scenario, rules_of(self.scenario))
 
     def actions(self, mission: int, episode: int, step: int, kind: int = 0) -> np.ndarray:
-        """A team's actions, (A, N) float32 or (A,) int64; another `kind` gives other ones."""
+        """Return a team's actions, (A, N) float32 or (A,) int64; another `kind` gives other ones."""
         rng = np.random.default_rng([self.seed + mission, episode, step, kind])
         if self.scenario.action.by_number:
             return rng.integers(0, self.choices, self.scenario.robots)
@@ -77,7 +77,7 @@ class Task:
 
 
 def parts_of(value: object) -> dict[Any, Any] | None:
-    """What a container holds, by key, number or field; None if it is none."""
+    """Return what a container holds, by key, number or field; None if it is none."""
     if isinstance(value, Mapping):
         return dict(value)
     if isinstance(value, np.ndarray) and value.dtype.names:  # bytes between fields mean nothing
@@ -88,14 +88,14 @@ def parts_of(value: object) -> dict[Any, Any] | None:
 
 
 def walk(value: object, where: str = "") -> Iterator[tuple[str, Any]]:
-    """A value and, if it is a container, all that is in it, with their places."""
+    """Yield a value and, if it is a container, all that is in it, with their places."""
     yield where, value
     for key, part in (parts_of(value) or {}).items():
         yield from walk(part, f"{where} › {key}" if where else str(key))
 
 
 def leaves(value: object, where: str = "") -> Leaves:
-    """What a value is made of, as something that nobody can change any more."""
+    """Return what a value is made of, as something that nobody can change any more."""
     found: Leaves = {}
     for place, part in walk(value, where):
         kind = type(part).__name__
@@ -119,7 +119,7 @@ def require_same(what: str, first: Leaves, second: Leaves) -> None:
 
 
 def _difference(one: tuple[Any, ...], two: tuple[Any, ...]) -> str:
-    """The first entry that differs in arrays of one kind, else both values."""
+    """Return the first entry that differs in arrays of one kind, else both values."""
     if len(one) < 4 or one[:3] != two[:3]:
         return ", then ".join(" ".join(map(str, leaf[:3])) for leaf in (one, two))
     first, second = (np.frombuffer(leaf[3], leaf[1]).reshape(leaf[2]) for leaf in (one, two))
@@ -155,7 +155,7 @@ def finish(
 
 
 def story(moments: Iterator[tuple[str, dict[str, Any]]]) -> Leaves:
-    """The leaves of a play, taken moment by moment."""
+    """Return the leaves of a play, taken moment by moment."""
     found: Leaves = {}
     for moment, parts in moments:
         found |= leaves(parts, moment)
@@ -163,11 +163,11 @@ def story(moments: Iterator[tuple[str, dict[str, Any]]]) -> Leaves:
 
 
 def named(env: EntropyExploreEnv, result: tuple[Any, ...]) -> dict[str, Any]:
-    """What reset or step returned, by name, and the state."""
+    """Return what reset or step returned, by name, and the state."""
     names = PARTS if len(result) == 5 else (PARTS[0], PARTS[-1])
     return {**dict(zip(names, result, strict=True)), "state": env.state()}
 
 
 def by_agent(env: EntropyExploreEnv, actions: np.ndarray) -> dict[str, Any]:
-    """A team's actions as a ParallelEnv takes them."""
+    """Return a team's actions as a ParallelEnv takes them."""
     return dict(zip(env.possible_agents, actions, strict=True))

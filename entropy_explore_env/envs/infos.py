@@ -24,12 +24,12 @@ Stable-Baselines3's Monitor and VecMonitor by `info_keywords=END_FIGURES`."""
 
 
 def end_figures(figures: Mapping[str, Any]) -> dict[str, float]:
-    """The END_FIGURES out of a mission's figures; NaN where one is not defined."""
+    """Return the END_FIGURES out of a mission's figures; NaN where one is not defined."""
     return {name: math.nan if figures[name] is None else float(figures[name]) for name in END_FIGURES}
 
 
 def robot_infos(missions: Missions, mission: int, texts: bool = True) -> list[dict[str, Any]]:
-    """An info for each robot of a mission.
+    """Return an info for each robot of a mission.
 
     Keys: `deciding` (whether its next action counts), `time_s`, `world_number` (the world's, which `reset`
     takes as its option `world`; -1 where no recipe made it), `entropy_bits`, `own_bits` and

@@ -103,11 +103,11 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         self._painter = Painter(render_mode)
 
     def observation_space(self, agent: str) -> spaces.Space:
-        """The agent's observation space, the same object on every call."""
+        """Return the agent's observation space, the same object on every call."""
         return self._observation_spaces[self._checked(agent)]
 
     def action_space(self, agent: str) -> spaces.Space:
-        """The agent's action space, the same object on every call."""
+        """Return the agent's action space, the same object on every call."""
         return self._action_spaces[self._checked(agent)]
 
     @functools.cached_property
@@ -116,7 +116,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         return self.missions.layout.flat_space(self.scenario.robots)
 
     def state(self) -> np.ndarray:
-        """What all robots observe, one after the other: (A·F,) float32, for centralised critics.
+        """Return what all robots observe, one after the other: (A·F,) float32, for centralised critics.
 
         Raises:
             CallOrderError: There was no reset yet.
@@ -126,7 +126,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         return self.missions.observations[0].flatten()
 
     def view(self, agent: str) -> RobotView:
-        """What a robot knows; strategies see this and nothing else.
+        """Return what a robot knows; strategies see this and nothing else.
 
         Raises:
             CallOrderError: There was no reset yet.
@@ -142,7 +142,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         return agent
 
     def deciding_agents(self) -> list[str]:
-        """The robots whose actions count in the next step, by number.
+        """Return the robots whose actions count in the next step, by number.
 
         Raises:
             CallOrderError: There was no reset yet.
@@ -153,7 +153,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         return [agent for agent, decides in zip(self.agents, deciding, strict=False) if decides]
 
     def strategy_generator(self) -> np.random.Generator:
-        """The mission's random stream for whoever chooses the actions.
+        """Return the mission's random stream for whoever chooses the actions.
 
         Raises:
             CallOrderError: There was no reset yet.
@@ -220,7 +220,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         self._checker.one(agent, action)
 
     def _in_order(self, actions: Mapping[str, Any]) -> list[tuple[str, Any]]:
-        """The actions in the order of the robots, if there is one for each."""
+        """Return the actions in the order of the robots, if there is one for each."""
         if not self.agents:
             late = "after the mission's end" if self.missions.episodes[0] >= 0 else "before reset"
             raise CallOrderError(f"step {late}: call reset() first")
@@ -242,7 +242,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         return f"EntropyExploreEnv({self.scenario.in_short})"
 
     def joint_map(self) -> Map:
-        """What the team knows together: see `interop.team_maps.joint_map`; for files, `interop.map_files`.
+        """Return what the team knows together (`interop.team_maps`); for files, see `interop.map_files`.
 
         Raises:
             CallOrderError: There was no reset yet.
@@ -258,7 +258,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         self.missions.set_world_block(0, low_m, high_m, solid, at_s)
 
     def render(self) -> np.ndarray | None:
-        """The picture of this moment, (480, 640, 3) uint8 for `rgb_array`; `human` shows it by itself."""
+        """Return the picture of this moment, (480, 640, 3) uint8; `human` shows it by itself."""
         return self._painter.picture(self.missions)
 
     def close(self) -> None:
@@ -276,7 +276,7 @@ def parallel_env(
     text_infos: bool = True,
     **settings: Unpack[ScenarioSettings],
 ) -> EntropyExploreEnv:
-    """A team's mission as a ParallelEnv: see `EntropyExploreEnv`.
+    """Return a team's mission as a ParallelEnv: see `EntropyExploreEnv`.
 
     Args:
         scenario: A scenario's name (`entropy_explore_env.SCENARIOS`), or a Scenario.
@@ -313,11 +313,11 @@ class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):
         self._team = team
 
     def view(self, agent: str) -> RobotView:
-        """What a robot knows; see `EntropyExploreEnv.view`."""
+        """Return what a robot knows; see `EntropyExploreEnv.view`."""
         return self._team.view(agent)
 
     def observe(self, agent: str) -> Any:  # noqa: ANN401 - PettingZoo's signature
-        """What a robot observes.
+        """Return what a robot observes.
 
         Raises:
             CallOrderError: There was no reset yet.
@@ -328,7 +328,7 @@ class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):
         return super().observe(agent)
 
     def last(self, observe: bool = True) -> Any:  # noqa: ANN401 - PettingZoo's signature
-        """What the robot whose turn it is observes, and what it earned since it last acted.
+        """Return what the robot whose turn it is observes, and what it earned since it last acted.
 
         Raises:
             CallOrderError: There was no reset yet.
@@ -337,7 +337,7 @@ class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):
         return super().last(observe)
 
     def state(self) -> np.ndarray:
-        """What all robots observe; see `EntropyExploreEnv.state`."""
+        """Return what all robots observe; see `EntropyExploreEnv.state`."""
         return self._team.state()
 
     def _begun(self, call: str) -> None:
@@ -371,7 +371,7 @@ def env(
     text_infos: bool = True,
     **settings: Unpack[ScenarioSettings],
 ) -> TurnTakingEnv:
-    """The same as an AECEnv: robots act in turn, and the step is taken when all have."""
+    """Return the same as an AECEnv: robots act in turn, and the step is taken when all have."""
     return TurnTakingEnv(
         parallel_env(
             scenario,

@@ -20,7 +20,7 @@ class _PrivilegedVectorEnv(EntropyExploreVectorEnv):
     """Missions whose flat observations are followed by the numbers of PRIVILEGED."""
 
     def robot_space(self) -> spaces.Space:
-        """A Box of flat observations and P further numbers.
+        """Return a Box of flat observations and P further numbers.
 
         Raises:
             SettingError: Observations are not flat.

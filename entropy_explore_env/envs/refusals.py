@@ -23,7 +23,7 @@ from entropy_explore_env.errors import ActionError, CallOrderError, EntropyExplo
 
 
 def check_call_order(task: Task) -> None:
-    """Calls before reset and after the end raise a CallOrderError and change nothing."""
+    """Check that calls before reset and after the end raise a CallOrderError and change nothing."""
     env, batch = task.env(), task.vector_env(2)
     actions, table = by_agent(env, task.actions(0, 0, 1)), task.table(2, 0, 1)
     require_refused("step before reset", env, CallOrderError, lambda: env.step(actions))
@@ -39,7 +39,7 @@ def check_call_order(task: Task) -> None:
 
 
 def check_bad_actions(task: Task) -> None:
-    """A bad action raises an ActionError with field, value and what is allowed, and changes nothing."""
+    """Check that a bad action raises an ActionError with field and value, and changes nothing."""
     env = task.env()
     env.reset(task.seed)
     good = by_agent(env, task.actions(0, 0, 1))
@@ -61,7 +61,7 @@ def check_bad_actions(task: Task) -> None:
 
 
 def bad_actions(task: Task, good: np.ndarray) -> dict[str, Any]:
-    """What must be refused in place of a robot's action or of a VectorEnv's, by what is wrong with it."""
+    """Yield what must be refused in place of a robot's or a VectorEnv's action, by what is wrong with it."""
     wrong: dict[str, Any] = {"None": None, "text": "up", "a dict": {}, "ragged": [[0.0], [0.0, 0.0]]}
     wrong |= {"complex": good * 1j, "too many": np.stack([good, good]), "an object": object()}
     if task.scenario.action.by_number:

@@ -82,7 +82,7 @@ class StepRewards:
         return f"{named.__module__}.{named.__qualname__}"
 
     def before(self, missions: Missions) -> _Counters | None:
-        """What `after` has to know of the moment before the step; None where there is no function."""
+        """Return what `after` has to know of the moment before the step; None where there is no function."""
         if self.function is None:
             return None
         robots, clocks = missions.state.robots, missions.state.missions
@@ -94,7 +94,7 @@ class StepRewards:
         )
 
     def after(self, missions: Missions, before: _Counters | None) -> np.ndarray:
-        """The rewards of the step that was just taken, before any mission starts anew.
+        """Return the rewards of the step that was just taken, before any mission starts anew.
 
         Args:
             missions: After the step.
@@ -122,7 +122,7 @@ class StepRewards:
         return rewards.astype(np.float64)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> StepRewards:
-        """A copy, also where the function could not be pickled."""
+        """Return a copy, also where the function could not be pickled."""
         return StepRewards(copy.deepcopy(self.function, memo))
 
     def __reduce__(self) -> tuple[type, tuple[RewardFunction | None]]:
@@ -147,7 +147,7 @@ def _driven_m(missions: Missions) -> np.ndarray:
 
 
 def _figures(missions: Missions, before: _Counters) -> StepFigures:
-    """The figures of the step since `before`."""
+    """Return the figures of the step since `before`."""
     robots, clocks = missions.state.robots, missions.state.missions
     team = np.ones(robots.shape)
     ran = before.running[:, None]

@@ -134,7 +134,7 @@ class EntropyExploreMultiAgentEnv(MultiAgentEnv):
         )
 
     def render(self) -> Any:  # noqa: ANN401 - Gymnasium's signature
-        """The picture of this moment, (480, 640, 3) uint8 for `rgb_array`."""
+        """Return the picture of this moment, (480, 640, 3) uint8 for `rgb_array`."""
         return self.team.render()
 
     def close(self) -> None:
@@ -143,7 +143,7 @@ class EntropyExploreMultiAgentEnv(MultiAgentEnv):
 
 
 def runner_seed(run: int, runners: int, runner: int, number: int) -> int:
-    """The seed of one environment of one runner.
+    """Return the seed of one environment of one runner.
 
     RLlib seeds the environments of a runner with run + runner + 0, 1, …: with several environments each,
     neighbouring runners, and neighbouring runs, would explore the same worlds from the same starts. A

@@ -164,7 +164,7 @@ class RobotVecEnv(VecEnv):
         self._options = kept
 
     def _fixed(self, rows: list[dict[str, Any]]) -> list[ResetOptions]:
-        """What options of the rows are for the missions."""
+        """Return what options of the rows are for the missions."""
         scenario, missions = self.scenario, self._team[0]
         if all(row is rows[0] for row in rows):
             return batch_options(rows[0], scenario, missions)
@@ -226,7 +226,7 @@ class RobotVecEnv(VecEnv):
         last: dict[str, Any],
         told: list[dict[str, Any]],
     ) -> None:
-        """What infos say of the rows of a mission that ended."""
+        """Fill in what infos say of the rows of a mission that ended."""
         truncated = not goals_reached(last["end"])[mission]
         for robot in range(self._robots):
             row = mission * self._robots + robot
@@ -289,7 +289,7 @@ class RobotVecEnv(VecEnv):
         return masks.reshape(self.num_envs, masks.shape[-1])
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:  # noqa: ANN401 - SB3's signature
-        """An attribute of the missions, once for each row asked for.
+        """Return an attribute of the missions, once for each row asked for.
 
         Raises:
             AttributeError: They have none of this name, as Stable-Baselines3 has it.
@@ -300,7 +300,7 @@ class RobotVecEnv(VecEnv):
         return [value for _ in self._get_indices(indices)]
 
     def get_images(self) -> list[Any]:
-        """A picture of each mission, (480, 640, 3) uint8, for `render_mode="rgb_array"`."""
+        """Return a picture of each mission, (480, 640, 3) uint8, for `render_mode="rgb_array"`."""
         return list(self.vector_env.render()) if self.vector_env.render_mode == "rgb_array" else []
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:  # noqa: ANN401

@@ -124,7 +124,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         return masks_of(self.missions)[0, 0]
 
     def view(self) -> RobotView:
-        """What the robot knows; strategies see this and nothing else."""
+        """Return what the robot knows; strategies see this and nothing else."""
         if self.missions.episodes[0] < 0:
             raise CallOrderError("view before reset: call reset() first")
         return view_of(self.missions, 0, 0)
@@ -134,7 +134,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         return f"SingleRobotEnv({self.scenario.in_short})"
 
     def render(self) -> Any:  # noqa: ANN401 - Gymnasium's signature
-        """The picture of this moment, (480, 640, 3) uint8 for `rgb_array`."""
+        """Return the picture of this moment, (480, 640, 3) uint8 for `rgb_array`."""
         return self._painter.picture(self.missions)
 
     def close(self) -> None:

@@ -125,7 +125,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         self._painters = [Painter(render_mode, mission) for mission in range(painted)]
 
     def robot_space(self) -> spaces.Space:
-        """A new space object of one robot's observation."""
+        """Return a new space object of one robot's observation."""
         return self.missions.layout.space()
 
     def _vectors(self) -> np.ndarray:
@@ -258,7 +258,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         return self.missions.layout.split(self._of_robots(self._vectors()))
 
     def _infos(self, earned: np.ndarray | None = None) -> dict[str, Any]:
-        """The infos of this moment; `earned`, (E, A), are the rewards of a step, a reset brings none."""
+        """Return the infos of this moment; `earned` (E, A) are the rewards of a step, None after a reset."""
         clocks, robots = self.missions.state.missions, self.missions.state.robots
         infos: dict[str, Any] = {name: clocks[name].copy() for name in ("time_s", "end")}
         for name in ("deciding", "entropy_bits", "own_bits", "received_bits"):
@@ -306,7 +306,7 @@ def registered_vector_env(
     max_episode_steps: int | None = None,
     **more: Any,  # noqa: ANN401 - as EntropyExploreVectorEnv takes them
 ) -> EntropyExploreVectorEnv:
-    """What `gymnasium.make_vec` makes: an EntropyExploreVectorEnv.
+    """Return what `gymnasium.make_vec` makes: an EntropyExploreVectorEnv.
 
     Args:
         scenario: As of EntropyExploreVectorEnv.

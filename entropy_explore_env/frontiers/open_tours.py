@@ -16,7 +16,7 @@ _LONGEST_STRETCH = 3
 
 
 def open_tour(lengths: np.ndarray) -> np.ndarray:
-    """A short tour from place 0 through all others.
+    """Return a short tour from place 0 through all others.
 
     Args:
         lengths: (N, N) float64 lengths of the ways from place to place, symmetric; inf is not allowed.

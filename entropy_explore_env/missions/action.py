@@ -34,7 +34,7 @@ ROUNDING = 1e-6
 
 
 def action_space(scenario: Scenario) -> spaces.Box | spaces.Discrete:
-    """A new space object of one robot's action."""
+    """Return a new space object of one robot's action."""
     if scenario.action.kind == "continuous":
         return spaces.Box(-1.0, 1.0, (3 if scenario.planar else 5,), np.float32)
     if scenario.action.kind == "candidates":
@@ -99,7 +99,7 @@ def encode_viewpoint(
     robot: int = 0,
     candidates: np.ndarray | None = None,
 ) -> np.ndarray | np.int64:
-    """The action that sends a robot to a viewpoint.
+    """Return the action that sends a robot to a viewpoint.
 
     Continuous actions hold it up to float32 rounding; a place beyond the reach is pulled onto it.
     Discrete actions hold it exactly if it is the centre of a voxel within reach with a gaze of the
@@ -150,7 +150,7 @@ def encode_viewpoint(
 
 
 def _nearest_candidate(settings: np.void, wanted: np.ndarray, candidates: np.ndarray | None) -> np.int64:
-    """The number of the candidate that is nearest to a viewpoint."""
+    """Return the number of the candidate that is nearest to a viewpoint."""
     if candidates is None or len(candidates) == 0:
         return np.int64(0)
     places = np.linalg.norm(candidates[:, :3] - wanted[:3], axis=1) / settings["voxel_size_m"]
@@ -159,7 +159,7 @@ def _nearest_candidate(settings: np.void, wanted: np.ndarray, candidates: np.nda
 
 
 def _encoded_box(settings: np.void, pose: np.ndarray, wanted: np.ndarray, axes: int) -> np.ndarray:
-    """The continuous action for a viewpoint."""
+    """Return the continuous action for a viewpoint."""
     if math.isinf(settings["reach_m"]):
         last = np.maximum(settings["size"][:axes] - 1, 1) * settings["voxel_size_m"]
         move = (

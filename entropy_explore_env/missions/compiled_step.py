@@ -157,7 +157,7 @@ class CompiledStep:
         observe(*arguments)
 
     def _bound_calls(self, arrays: Arrays) -> _Calls:
-        """What a step calls, for the arrays as they are: some are replaced when a world has a ceiling."""
+        """Return what a step calls, for the arrays as they are: a world with a ceiling replaces some."""
         calls, state, no_fly = self._calls, arrays.state, arrays.no_fly
         if calls is None or calls.arrays.state is not state or calls.arrays.no_fly is not no_fly:
             params, actions = self._rules.params, self._rules.actions

@@ -240,7 +240,7 @@ def stop(params, robot, time_s):
 
 @lean_kernel
 def halt(params, robot, time_s, until_s):
-    """A robot stops at once where it is; its drive and its scan are over, and it decides anew at a time.
+    """Stop a robot at once where it is; its drive and its scan are over, and it decides anew at a time.
 
     Args:
         params: PARAMS of the robot.

@@ -57,7 +57,7 @@ class Start(NamedTuple):
 def draw_start(
     scenario: Scenario, fixed: FixedWorlds, mission: int, seed: int, episode: int, options: ResetOptions
 ) -> Start:
-    """What a mission would start with as an episode of a seed.
+    """Return what a mission would start with as an episode of a seed.
 
     Args:
         scenario: The task.
@@ -130,7 +130,7 @@ def fill_start(scenario: Scenario, rules: Rules, state: MissionState, start: Sta
 
 
 def _set_seen_goal(scenario: Scenario, state: MissionState, mission: int, start: Start) -> None:
-    """What can be seen, from places within reach where that ends the mission, and how much has to be."""
+    """Return what can be seen, from places within reach where that ends the mission, and how much must be."""
     clock, ending, world = state.missions[mission], scenario.ending, start.world
     by_seen = ending.by_seen
     visible = visible_from(world, scenario, start.poses) if by_seen else world.visible(scenario)

@@ -32,7 +32,7 @@ class Event(NamedTuple):
 
 @lean_kernel
 def next_event(shared, robots, messages, phases, faults):
-    """The earliest Event.
+    """Return the earliest Event.
 
     Of those at one instant robots that stop come first; then messages, in the order of sending; then the
     broadcast of all robots; then robots by number.
@@ -78,7 +78,7 @@ def next_robot(robots):
 
 @lean_kernel
 def events_handled(robots, messages, phases, faults):
-    """A number that every event makes greater, so that none is met twice: asserted in debug builds.
+    """Return a number that every event makes greater, so that none is met twice: asserted in debug builds.
 
     A message frees its slot. A broadcast is counted. A robot counts its scan; or it decides, having waited or
     driven since it last decided; or it puts that off. A scan may send a message, begin the wait of a robot

@@ -80,7 +80,7 @@ def failing(states: np.ndarray, time_s: np.ndarray | float) -> dict[str, np.ndar
 
 
 def fault_counts(states: np.ndarray) -> dict[str, int]:
-    """What faults did up to now, summed over the team (A,) FAULT."""
+    """Return what faults did up to now, summed over the team (A,) FAULT."""
     counted = ("blind_scans", "rays_lost")
     messages = ("messages_silenced", "messages_garbled", "messages_repeated", "messages_late")
     return {"robots_stopped": int(states["stopped"].sum())} | {

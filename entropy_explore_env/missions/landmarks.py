@@ -100,7 +100,7 @@ def choose_landmark(localization, params, index, scene, scan, belief, matrices):
 
 @inlined_kernel
 def worst_landmark(landmarks):
-    """The first free place, or the number of the landmark with the lowest score."""
+    """Return the first free place, or the number of the landmark with the lowest score."""
     worst = 0
     for number in range(len(landmarks)):
         if not landmarks[number].used:
@@ -122,7 +122,7 @@ def apart(landmarks, slot, point, apart_m):
 
 @lean_kernel
 def voxel_behind(params, point, direction):
-    """Number of the voxel in the workspace that begins where a ray has ended.
+    """Return number of the voxel in the workspace that begins where a ray has ended.
 
     Args:
         params: PARAMS of the robot.

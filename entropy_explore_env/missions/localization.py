@@ -181,7 +181,7 @@ def believe_pose(estimate, params, pose):
 
 @lean_kernel
 def into_workspace(params, axis, number):
-    """A coordinate in metres: itself, if it is in the workspace, or the nearest one that is."""
+    """Return a coordinate in metres: itself, if it is in the workspace, or the nearest one that is."""
     low, edge = params.origin_m[axis], params.voxel_size_m
     high = low + params.size[axis] * edge
     if not number >= low:  # nor is NaN
@@ -247,7 +247,7 @@ def choice_into_world(estimate, params, robot, choice, time_s):
 
 @lean_kernel
 def measure(localization, scan, sensor, scene, pose, rng):
-    """What a robot's sensor measures from where it truly is: all of the scan only where nobody drifts."""
+    """Return what a robot's sensor measures from where it truly is: all of a scan only if no robot drifts."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         take_scan(scan, sensor, scene, pose, rng)
         return
@@ -346,7 +346,7 @@ def weigh_batch(localization, covariances, slot, scan, count, voxel_size_m):
 
 @lean_kernel
 def covariance_bits(localization):
-    """What the covariance of its sender's pose adds to a batch of measurements."""
+    """Return what the covariance of its sender's pose adds to a batch of measurements."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return 0
     return BITS_PER_COVARIANCE

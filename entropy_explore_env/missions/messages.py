@@ -145,7 +145,7 @@ def write_announcement(robot, announced):
 
 @lean_kernel
 def message_bits(localization, count):
-    """What a message costs: a batch of `count` measurements, or an announcement (count = -1).
+    """Return what a message costs: a batch of `count` measurements, or an announcement (count = -1).
 
     Args:
         localization: Of the Team: where robots drift, batches carry their senders' covariances.
@@ -349,7 +349,7 @@ def count_sent(robot, count, bits):
 
 @lean_kernel
 def receive(team, maps, in_flight, slot, tracer, scan):
-    """A delayed message arrives: its recipients fuse it, or note what it announces; its slot is free again.
+    """Deliver a delayed message: recipients fuse it, or note what it announces; its slot is free again.
 
     Args:
         team: Team.

@@ -116,7 +116,7 @@ def broadcast_all(team, maps, buffers, phases, time_s, tracer, scan):
 
 @lean_kernel
 def broadcast(team, maps, buffers, side, index, time_s, tracer, scan):
-    """A robot sends a buffer; teammates that do not have it yet fuse it.
+    """Send a robot's buffer; teammates that do not have it yet fuse it.
 
     Args:
         team: Team.
@@ -177,7 +177,7 @@ def broadcast(team, maps, buffers, side, index, time_s, tracer, scan):
 
 @lean_kernel
 def buffer_bits(localization, batches, count):
-    """What a broadcast of the first `count` of (S,) BATCH costs."""
+    """Return what a broadcast of the first `count` of (S,) BATCH costs."""
     bits = 0
     for place in range(count):
         bits += message_bits(localization, batches[place].count)

@@ -45,7 +45,7 @@ PRIVILEGED = (
 
 
 def privileged_numbers(missions: Missions) -> np.ndarray:
-    """What only training may know of each robot's situation.
+    """Return what only training may know of each robot's situation.
 
     Args:
         missions: E missions of A robots.

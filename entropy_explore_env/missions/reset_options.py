@@ -38,7 +38,7 @@ class ResetOptions(NamedTuple):
     world: World | None = None
 
     def filled_up(self, others: ResetOptions) -> ResetOptions:
-        """These options, and of others what these leave open."""
+        """Return these options, and of others what these leave open."""
         starts = others.starts if self.starts is None else self.starts
         if self.world is None and self.world_number is None:
             return ResetOptions(starts, others.world_number, others.world)
@@ -74,7 +74,7 @@ def named_options(
 
 
 def mission_options(options: Mapping[str, Any], scenario: Scenario) -> ResetOptions:
-    """What is given for one mission.
+    """Return what is given for one mission.
 
     Args:
         options: As `named_options` gives them; other names than these are left alone.
@@ -95,7 +95,7 @@ def mission_options(options: Mapping[str, Any], scenario: Scenario) -> ResetOpti
 
 
 def batch_options(options: Mapping[str, Any], scenario: Scenario, missions: int) -> list[ResetOptions]:
-    """What is given for each of E missions.
+    """Return what is given for each of E missions.
 
     Args:
         options: As for `mission_options`; one value for all missions, or E values.
@@ -124,7 +124,7 @@ def batch_options(options: Mapping[str, Any], scenario: Scenario, missions: int)
 
 
 def _as_numbers(starts: object) -> np.ndarray:
-    """An array of whatever was given; one of objects where it is no array of numbers."""
+    """Return an array of whatever was given; one of objects where it is no array of numbers."""
     try:
         return np.asarray(starts)
     except Exception:  # lists of different lengths, or an __array__ of somebody else's
@@ -132,7 +132,7 @@ def _as_numbers(starts: object) -> np.ndarray:
 
 
 def _finite_poses(starts: object, shape: tuple[int, ...], shapes: str) -> np.ndarray:
-    """A new float64 array of this shape, or an error that names the shapes allowed."""
+    """Return a new float64 array of this shape, or an error that names the shapes allowed."""
     poses = _as_numbers(starts)
     if poses.shape != shape or poses.dtype.kind not in "fiu" or not np.isfinite(poses).all():
         allowed = f"finite numbers of shape {shapes}: x, y, z, yaw, pitch of each robot"
@@ -141,7 +141,7 @@ def _finite_poses(starts: object, shape: tuple[int, ...], shapes: str) -> np.nda
 
 
 def _world_number(number: object, scenario: Scenario) -> int:
-    """A world number, if the scenario has worlds by number and this one in its split."""
+    """Return a world number, if the scenario has worlds by number and this one in its split."""
     if scenario.world not in RECIPES:
         allowed = "a World of the scenario's grid: only the worlds of recipes have numbers"
         raise SettingError("world", number, allowed)

@@ -108,7 +108,7 @@ class Rules(NamedTuple):
 
 
 def rules_of(scenario: Scenario) -> Rules:
-    """The rules of a scenario."""
+    """Return the rules of a scenario."""
     ending, channel = scenario.ending, scenario.channel
     bodies = collision_bodies(scenario)
     shared = {
@@ -180,7 +180,7 @@ def rules_of(scenario: Scenario) -> Rules:
 
 
 def fault_params(scenario: Scenario) -> np.ndarray | None:
-    """(A,) FAULT_PARAMS, what is wrong with each robot; None = nothing ever is."""
+    """Return (A,) FAULT_PARAMS, what is wrong with each robot; None = nothing ever is."""
     if not scenario.faults.happen:
         return None
     params = np.zeros(scenario.robots, FAULT_PARAMS)
@@ -198,7 +198,7 @@ def fault_params(scenario: Scenario) -> np.ndarray | None:
 
 
 def localization_params(scenario: Scenario) -> np.ndarray | None:
-    """(A,) LOCALIZATION_PARAMS, how each robot localises itself; None = all know where they are."""
+    """Return (A,) LOCALIZATION_PARAMS, how each robot localises itself; None = all know where they are."""
     if not scenario.drifts:
         return None
     params, fiducials = np.zeros(scenario.robots, LOCALIZATION_PARAMS), scenario.fiducials
@@ -232,7 +232,7 @@ POINT = Body(0.0, None)
 
 
 def collision_bodies(scenario: Scenario) -> list[Body]:
-    """The team's bodies that differ in what they collide with."""
+    """Return the team's bodies that differ in what they collide with."""
     return list(dict.fromkeys(_collision_body(scenario, kind.robot) for kind in scenario.kinds))
 
 

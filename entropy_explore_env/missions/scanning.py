@@ -34,7 +34,7 @@ _NOTHING = int(Return.NOTHING)
 
 @lean_kernel
 def scan_and_share(mission, sensor, index, work):
-    """A robot measures from where it is, fuses, and sends what is most useful.
+    """Let a robot measure from where it is, fuse, and send what is most useful.
 
     Args:
         mission: Mission, changed in place.

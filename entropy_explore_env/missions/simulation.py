@@ -151,7 +151,7 @@ class Missions:
         self.reset_some([self._checked(mission)], [seed], [options])
 
     def _checked(self, mission: int) -> int:
-        """The number of a mission, if there is one."""
+        """Return the number of a mission, if there is one."""
         if not is_whole(mission, 0, self.count - 1):
             raise SettingError("mission", mission, f"a whole number from 0 to {self.count - 1}")
         return int(mission)
@@ -171,7 +171,7 @@ class Missions:
         seeds: Sequence[int | None],
         options: Sequence[ResetOptions] | None = None,
     ) -> list[Start]:
-        """What missions would start with after a reset; nothing changes. See `reset`."""
+        """Return what missions would start with after a reset; nothing changes. See `reset`."""
         given = [DRAWN] * len(seeds) if options is None else options
         return [
             self.draw_episode(mission, *self._episode(mission, seed), fixed)
@@ -195,7 +195,7 @@ class Missions:
         return self.seeds[mission], self.episodes[mission] + 1
 
     def draw_episode(self, mission: int, seed: int, episode: int, options: ResetOptions) -> Start:
-        """What a mission would start with as an episode of a seed; nothing changes. See `reset`."""
+        """Return what a mission would start with as an episode of a seed; nothing changes. See `reset`."""
         fixed = FixedWorlds(self.given, self._read)
         filled = options.filled_up(self.every_reset)
         return draw_start(self.scenario, fixed, mission, seed, episode, filled)
@@ -222,11 +222,11 @@ class Missions:
         self._compiled_step.observe(self._arrays(), mission, mission + 1)
 
     def _arrays(self) -> Arrays:
-        """What a step reads and changes."""
+        """Return what a step reads and changes."""
         return Arrays(self.state, self._no_fly, self.observations)
 
     def _set_collision_masks(self, mission: int, world: World) -> None:
-        """What is in the way of the team's bodies."""
+        """Prepare what is in the way of the team's bodies."""
         for robot in range(min(len(self.scenario.kinds), self.scenario.robots)):
             params, kind = self.rules.params[robot], self.scenario.kind_of(robot)
             row = mission * params["bodies"] + params["body_number"]
@@ -291,7 +291,7 @@ class Missions:
                     self._change(mission, change)
 
     def strategy_generator(self, mission: int) -> np.random.Generator:
-        """The random stream of whoever chooses the actions in this mission's episode.
+        """Return the random stream of whoever chooses the actions in this mission's episode.
 
         Raises:
             SettingError: There is no such mission.

@@ -249,7 +249,7 @@ def advance(mission, sensors, work):
 
 @lean_kernel
 def scan_at(mission, sensors, index, work):
-    """A robot scans at the mission's time, and then stops, drives on, or ends its drive.
+    """Let a robot scan at the mission's time, and then stop, drive on, or end its drive.
 
     Args:
         mission: Mission, changed in place.

@@ -75,7 +75,7 @@ class RobotView(RobotKnowledge):
         )
 
     def action_for(self, viewpoint: np.ndarray) -> np.ndarray | np.int64:
-        """The action that sends the robot to a viewpoint (5,): see `encode_viewpoint`."""
+        """Return the action that sends the robot to a viewpoint (5,): see `encode_viewpoint`."""
         return encode_viewpoint(self.rules, self.pose, viewpoint, self.robot, self.candidates)
 
     @property
@@ -113,7 +113,7 @@ class RobotView(RobotKnowledge):
 
 
 def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
-    """The view of one robot of one mission."""
+    """Return the view of one robot of one mission."""
     state, rules, shape = missions.state, missions.rules, missions.grid.shape
     time_s = float(state.missions[mission]["time_s"])
     own, here = state.robots[mission, robot], (mission, robot)
@@ -211,7 +211,7 @@ def _teammate(params: np.void, heard: np.void, time_s: float) -> TeammateView:
 
 
 def read_only(array: np.ndarray) -> np.ndarray:
-    """A view of an array that cannot be written through."""
+    """Return a view of an array that cannot be written through."""
     view = array.view()
     view.setflags(write=False)
     return view

@@ -59,7 +59,7 @@ class ViewObserver:
             self._proposer = ViewProposer(self.scenario, drawn_from, observation.overlaps)
 
     def observe(self, view: RobotView) -> np.ndarray:
-        """The flat observation of a robot.
+        """Return the flat observation of a robot.
 
         Args:
             view: Of the robot.

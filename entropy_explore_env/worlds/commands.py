@@ -28,7 +28,7 @@ from entropy_explore_env.worlds.formats import FORMATS, WORDS
 from entropy_explore_env.worlds.given import in_given_worlds
 from entropy_explore_env.worlds.load import load_world, make_world, save_world
 from entropy_explore_env.worlds.pictures import picture
-from entropy_explore_env.worlds.recipes.catalogue import RECIPES
+from entropy_explore_env.worlds.recipes.catalogue import about_recipe
 from entropy_explore_env.worlds.world import World
 from entropy_explore_env.writing import write_atomically
 
@@ -118,8 +118,7 @@ def _list(folder: Path | None) -> None:
     """Print what can be shown, a line each."""
     if folder is None:
         for name, scenario in SCENARIOS.items():
-            recipe = RECIPES[scenario.world]
-            print(f"{name}\tscenario\t{(recipe.__doc__ or '').splitlines()[0]}")
+            print(f"{name}\tscenario\t{about_recipe(scenario.world)}")
         print(f"{JACKSBORO}\televation model\tcomes with matplotlib")
         for suffix, form in FORMATS.items():
             print(f"*{suffix}\tfile\t{form.kind}")
@@ -133,7 +132,7 @@ def _list(folder: Path | None) -> None:
 
 
 def _world(args: argparse.Namespace) -> World:
-    """The world that a name or a file stands for."""
+    """Return the world that a name or a file stands for."""
     given = {name.replace("-", "_"): getattr(args, name.replace("-", "_")) for name in (*_NUMBERS, *_WORDS)}
     if args.hollow:
         given["fill"] = False
@@ -150,7 +149,7 @@ def _world(args: argparse.Namespace) -> World:
 
 
 def _world_of_scenario(scenario: Scenario, args: argparse.Namespace) -> World:
-    """The world with a number, or that of a mission with a seed."""
+    """Return the world with a number, or that of a mission with a seed."""
     if args.world_number is None:
         scenario = with_settings(scenario, {"split": args.split or "train"})
         return make_world(scenario, generator(check_seed(args.seed or 0), 0, Stream.WORLD))

@@ -9,7 +9,7 @@ from scipy import ndimage
 
 
 def connected_components(mask: np.ndarray) -> tuple[np.ndarray, int]:
-    """Number the face-connected components of a mask.
+    """Return number the face-connected components of a mask.
 
     Args:
         mask: (X, Y) or (X, Y, Z) bool.
@@ -22,7 +22,7 @@ def connected_components(mask: np.ndarray) -> tuple[np.ndarray, int]:
 
 
 def largest_component(mask: np.ndarray) -> np.ndarray:
-    """The largest face-connected component of a mask, of the same shape; empty if the mask is empty."""
+    """Return the largest face-connected component of a mask, as a mask; empty if the mask is empty."""
     labels, count = connected_components(mask)
     if count <= 1:
         return mask

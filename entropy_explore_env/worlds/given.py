@@ -30,7 +30,7 @@ _PATHS = "a mapping with the `path` of a file, or a list of paths"
 
 
 def with_given_worlds(scenario: Scenario, settings: Mapping[str, Any]) -> tuple[Scenario, tuple[World, ...]]:
-    """The scenario with settings changed, and the worlds that its missions are to be in.
+    """Return the scenario with settings changed, and the worlds that its missions are to be in.
 
     Args:
         scenario: What to start from.
@@ -61,7 +61,7 @@ def with_given_worlds(scenario: Scenario, settings: Mapping[str, Any]) -> tuple[
 
 
 def in_given_worlds(scenario: Scenario, given: Sequence[World]) -> Scenario:
-    """The scenario of missions in these worlds, with their grid.
+    """Return the scenario of missions in these worlds, with their grid.
 
     Raises:
         SettingError: They are no worlds, or the scenario does not fit their grid.
@@ -88,12 +88,12 @@ def checked_worlds(given: object) -> tuple[World, ...]:
 
 
 def world_in_turn(given: Sequence[World], seed: int, episode: int) -> World:
-    """The world of a mission: dealt in turn by its seed, the next one with each episode that follows."""
+    """Return the world of a mission: dealt by its seed, the next one with each episode that follows."""
     return given[(seed + episode) % len(given)]
 
 
 def _from_list(scenario: Scenario, asked: object) -> tuple[World, ...]:
-    """The worlds of a list of Worlds and paths, or a single World, on a grid that holds each.
+    """Return the worlds of a list of Worlds and paths, or a single World, on a grid that holds each.
 
     Raises:
         SettingError, WorldError: As of `with_given_worlds`.
@@ -118,7 +118,7 @@ def _names_a_file(word: object) -> bool:
 
 
 def _without_margins(world: World) -> World:
-    """A world without margins in which nothing is free, where they are large; the rest stays where it was.
+    """Return a world without large margins in which nothing is free; the rest stays where it was.
 
     Warns:
         WorldWarning: Margins were cropped.
@@ -132,7 +132,7 @@ def _without_margins(world: World) -> World:
 
 
 def _from_options(scenario: Scenario, asked: Mapping[str, Any]) -> tuple[World, ...]:
-    """The worlds that a mapping of one or several files' `path` and options stands for."""
+    """Return the worlds that a mapping of one or several files' `path` and options stands for."""
     options = dict(asked)
     path = options.pop("path", None)
     paths = list(path) if isinstance(path, list | tuple) else [path]
@@ -174,7 +174,7 @@ def on_one_grid(worlds: Sequence[World]) -> list[World]:
 
 
 def _widened(world: World, grid: Grid, with_ceiling: bool) -> World:
-    """A world on a larger grid, solid where it was not."""
+    """Return a world on a larger grid, solid where it was not."""
     if world.grid == grid and (world.ceiling is not None or not with_ceiling):
         return world
     x, y, z = world.grid.shape
@@ -191,7 +191,7 @@ def _widened(world: World, grid: Grid, with_ceiling: bool) -> World:
 
 
 def distinct_names(paths: Sequence[Path]) -> list[str]:
-    """The names of files without suffix, each with as many of its folders as make it differ from the others.
+    """Return names of files without suffix, each with as many folders as make it differ from the others.
 
     Files that differ in their suffix alone keep it; a file that is named twice has the same name twice.
     """
@@ -203,7 +203,7 @@ def distinct_names(paths: Sequence[Path]) -> list[str]:
 
 
 def distinct_paths(paths: Sequence[Path]) -> list[str]:
-    """The names of files, each with as many of its folders as make it differ from the others."""
+    """Return the names of files, each with as many of its folders as make it differ from the others."""
     whole = [path.absolute() for path in paths]
     return [_tail(path, [other for other in whole if other != path]) or path.as_posix() for path in whole]
 

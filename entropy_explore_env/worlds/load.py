@@ -47,7 +47,7 @@ _Given = ParamSpec("_Given")
 
 
 def _with_known_options(load: Callable[_Given, World]) -> Callable[_Given, World]:
-    """A function that loads worlds, whose options that are unknown are refused by name."""
+    """Return a function that loads worlds, whose options that are unknown are refused by name."""
     known = tuple(inspect.signature(load).parameters)
 
     @wraps(load)
@@ -87,7 +87,7 @@ def load_world(
     read_limit_s: float | None = None,
     read_memory_mib: float | None = None,
 ) -> World:
-    """The world in a file; its voxels lie in the file's frame, in metres. Unknown space is solid.
+    """Return the world in a file; its voxels lie in the file's frame, in metres. Unknown space is solid.
 
     By suffix: OctoMap (`.bt`, `.ot`), map_server (`.yaml`, `.yml`), plans as images and 16-bit height maps
     (`.png`, `.pgm`, `.jpg`, `.bmp`, `.gif`), point clouds (`.pcd`, `.ply`), meshes (`.obj`, `.stl`, `.glb`,
@@ -167,7 +167,7 @@ LOAD_OPTIONS = tuple(inspect.signature(load_world).parameters)[1:]
 def load_octomap(
     path: Path | str, voxel_size_m: float | None = None, *, read_memory_mib: float | None = None
 ) -> World:
-    """The world in an OctoMap tree, whatever its suffix; see `load_world`."""
+    """Return the world in an OctoMap tree, whatever its suffix; see `load_world`."""
     check_options({"voxel_size_m": voxel_size_m, "read_memory_mib": read_memory_mib})
     options = {"voxel_size_m": voxel_size_m}
     path = checked_path("world file", path)
@@ -191,7 +191,7 @@ def save_world(world: World, path: Path | str) -> None:
 
 
 def world_bytes(world: World) -> bytes:
-    """The content of the file that `save_world` writes."""
+    """Return the content of the file that `save_world` writes."""
     labels = world.occupied.astype(np.int8)
     for mask, label in ((world.unknown, UNKNOWN), (world.unreadable, UNREADABLE)):
         if mask is not None:
@@ -221,7 +221,7 @@ _SHADES = " (pixels darker than half of white are solid; occupied_below, --occup
 
 
 def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float | None) -> World:
-    """The world of a file's voxels, resampled and extruded."""
+    """Return the world of a file's voxels, resampled and extruded."""
     size_m = options["voxel_size_m"] or voxels.voxel_size_m
     try:
         labels, ceiling = resampled(voxels, size_m)
@@ -261,7 +261,7 @@ def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float |
 
 
 def make_world(scenario: str | Scenario, world: int | np.random.Generator) -> World:
-    """The true world of a mission: `make_world("office", 3)` is the office's world number 3.
+    """Return the true world of a mission: `make_world("office", 3)` is the office's world number 3.
 
     A world without random elements is the same for all numbers.
 
@@ -283,7 +283,7 @@ def make_world(scenario: str | Scenario, world: int | np.random.Generator) -> Wo
 
 
 def world_with_number(scenario: Scenario, number: int) -> World:
-    """The world that a recipe makes from a world number; without chance in it, the same for all.
+    """Return the world that a recipe makes from a world number; without chance in it, the same for all.
 
     Args:
         scenario: Its `world` names a recipe, its `grid` the workspace; nothing else matters.
@@ -308,7 +308,7 @@ def _empty_world(scenario: Scenario) -> World:
 
 
 def world_from_file(path: Path | str, voxel_size_m: float, **options: Any) -> World:  # noqa: ANN401 - as load_world's
-    """The world in a file, resampled; cached, so that many missions read it once.
+    """Return the world in a file, resampled; cached, so that many missions read it once.
 
     Args:
         path: As for `load_world`.
@@ -350,7 +350,7 @@ def _cached_world(
 
 
 def with_world(scenario: Scenario) -> Scenario:
-    """The scenario with the grid of its world's file; unchanged where the world is a recipe.
+    """Return the scenario with the grid of its world's file; unchanged where the world is a recipe.
 
     The scenario's voxel size is kept: the file's voxels are resampled to it.
 
@@ -363,7 +363,7 @@ def with_world(scenario: Scenario) -> Scenario:
 
 
 def world_of_file(scenario: Scenario) -> World | None:
-    """The world of the file that a scenario names; None where it names a recipe.
+    """Return the world of the file that a scenario names; None where it names a recipe.
 
     Raises:
         SettingError, WorldError: As of `with_world`.

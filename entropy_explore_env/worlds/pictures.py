@@ -87,7 +87,7 @@ class _Axes(NamedTuple):
 
 
 def picture(world: World, starts: np.ndarray | None = None) -> bytes:
-    """A PNG of a world, at most 1008 pixels wide.
+    """Return a PNG of a world, at most 1008 pixels wide.
 
     Args:
         world: The world.
@@ -131,7 +131,7 @@ def _seen(world: World) -> np.ndarray:
 
 
 def _with_starts(view: _View, starts: np.ndarray) -> _View:
-    """A view from above with the columns tinted in which robots may start."""
+    """Return a view from above with the columns tinted in which robots may start."""
     columns = _upright(np.atleast_3d(np.any(starts, axis=2)))
     tinted = (0.5 * view.pixels + 0.5 * np.array(_START)).astype(np.uint8)
     return view._replace(pixels=np.where(columns, tinted, view.pixels))
@@ -143,7 +143,7 @@ def _in(views: list[_View], colour: tuple[int, int, int], mask: np.ndarray | Non
 
 
 def _draw_key(draw: ImageDraw.ImageDraw, right: float, middle: float, shown: list[bool]) -> None:
-    """What the colours mean, in a line that ends at a place."""
+    """Draw what the colours mean, in a line that ends at a place."""
     for (colour, name), is_shown in reversed(list(zip(_KEY, shown, strict=True))):
         if not is_shown:
             continue
@@ -163,7 +163,7 @@ def _title(name: str, grid: Grid, width: float) -> str:
 
 
 def _views(world: World, scale: float) -> list[_View]:
-    """A plan, or a 3-D world from above and from the side; `scale` in pixels a metre."""
+    """Return a plan, or a 3-D world from above and from the side; `scale` in pixels a metre."""
     solid, (x, y, z) = world.occupied, world.grid.origin_m
     if world.grid.flat:
         plan = np.where(solid[:, :, 0, None], _SOLID, _FREE).astype(np.uint8)
@@ -201,7 +201,7 @@ def _views(world: World, scale: float) -> list[_View]:
 
 
 def _views_of_known(world: World, scale: float) -> list[_View]:
-    """A 3-D world of which a part is unknown: of the known part, how much of the line of sight is free."""
+    """Return views of a world that is partly unknown: how much of the known line of sight is free."""
     assert world.unknown is not None
     x, y, z = world.grid.origin_m
     pictures = []
@@ -218,14 +218,14 @@ def _views_of_known(world: World, scale: float) -> list[_View]:
 
 
 def _metres(value: float) -> str:
-    """A length with at most four digits, three where it is below a metre; whole metres from 1000 m on."""
+    """Return a length with at most four digits, three below a metre; whole metres from 1000 m on."""
     if 0 < abs(value) < 1:
         return f"{value:.3g}"
     return f"{value:.4g}" if abs(value) < 1000 else f"{value:.0f}"
 
 
 def _stretch(height: float) -> int:
-    """The factor by which a side view of this height in pixels is drawn higher."""
+    """Return the factor by which a side view of this height in pixels is drawn higher."""
     return 1 if height >= _LEAST_SIDE else math.ceil(_LEAST_SIDE / height)
 
 
@@ -242,7 +242,7 @@ def _coloured(shares: np.ndarray, colours: tuple[tuple[int, int, int], ...]) -> 
 
 
 def _panel(view: _View, pixels_a_voxel: float) -> Image.Image:
-    """A view at its scale; sharp where voxels are enlarged, averaged where they are reduced."""
+    """Return a view at its scale; sharp where voxels are enlarged, averaged where they are reduced."""
     rows, columns = view.pixels.shape[:2]
     size = max(1, round(columns * pixels_a_voxel)), max(1, round(rows * pixels_a_voxel * view.stretch))
     enlarged = pixels_a_voxel >= 1
@@ -271,12 +271,12 @@ def _draw_ticks(draw: ImageDraw.ImageDraw, axes: _Axes, corner_m: tuple[float, f
 
 
 def _round_step(least: float) -> float:
-    """The smallest of 1, 2, 5 times a power of ten that is at least this."""
+    """Return the smallest of 1, 2, 5 times a power of ten that is at least this."""
     power = 10.0 ** math.floor(math.log10(least))
     return next(f * power for f in (1.0, 2.0, 5.0, 10.0) if f * power >= least * (1 - 1e-9))
 
 
 def _ticks(low: float, length: float, step: float) -> list[float]:
-    """The multiples of a step from `low` on, within a length."""
+    """Return the multiples of a step from `low` on, within a length."""
     first, last = math.ceil(low / step - 1e-6), math.floor((low + length) / step + 1e-6)
     return [n * step for n in range(first, last + 1)]

@@ -149,7 +149,7 @@ def _look(left, places, free, steps, found):
 
 @lean_kernel
 def _squared(step):
-    """The squared length of a step of voxels."""
+    """Return the squared length of a step of voxels."""
     return step[0] * step[0] + step[1] * step[1] + step[2] * step[2]
 
 

@@ -29,7 +29,7 @@ WORLD_NUMBERS: Mapping[str, range] = MappingProxyType(
 
 
 def draw_world_number(split: str, rng: np.random.Generator) -> int:
-    """The number of a mission's world: uniform over the split's range.
+    """Return the number of a mission's world: uniform over the split's range.
 
     Args:
         split: `train`, `validation` or `test`.
@@ -40,5 +40,5 @@ def draw_world_number(split: str, rng: np.random.Generator) -> int:
 
 
 def world_generator(number: int) -> np.random.Generator:
-    """The random generator that a recipe draws the world with this number from."""
+    """Return the random generator that a recipe draws the world with this number from."""
     return np.random.default_rng(np.random.SeedSequence(number))

@@ -159,7 +159,7 @@ class World:
         return no_fly_mask(self.ceiling, self.grid.shape[2], radius)
 
     def _in_voxels(self, body_radius_m: float) -> float:
-        """A body's radius in voxel edges."""
+        """Return a body's radius in voxel edges."""
         if not is_number(body_radius_m) or not 0 <= body_radius_m < math.inf:
             raise WorldError("body_radius_m", body_radius_m, "a finite number ≥ 0")
         return body_radius_m / self.grid.voxel_size_m
@@ -272,7 +272,7 @@ class World:
 
 
 def _kept(array: np.ndarray) -> np.ndarray:
-    """The array itself if nobody can write through it, else a read-only copy."""
+    """Return the array itself if nobody can write through it, else a read-only copy."""
     if array.flags.writeable:
         array = array.copy()
         array.setflags(write=False)
@@ -357,7 +357,7 @@ def no_fly_mask(ceiling: np.ndarray, layers: int, body_radius: float) -> np.ndar
 
 
 def _inflated(mask: np.ndarray, radius: float, boundary: bool) -> np.ndarray:
-    """A mask inflated by the radius of a spherical body.
+    """Return a mask inflated by the radius of a spherical body.
 
     Args:
         mask: (X, Y, Z) bool.

@@ -55,12 +55,12 @@ optimiser = torch.optim.Adam(loss_module.parameters(), 3e-3)
 
 
 def choose(step: TensorDict) -> TensorDict:
-    """The team's actions: what the wrapper holds of the robots is a batch of its own."""
+    """Return the team's actions: what the wrapper holds of the robots is a batch of its own."""
     return step.set("robot", actor(step["robot"]))
 
 
 def choices_of(rollout: TensorDict) -> list[TensorDict]:
-    """What each robot chose, with advantages from choice to choice: a robot that drives cannot choose."""
+    """Return what each robot chose, with advantages from choice to choice: driving robots cannot choose."""
     found = []
     for robot in range(rollout["robot"].shape[1]):
         rows: Any = rollout["robot"][:, robot]

@@ -95,7 +95,7 @@ def cost_graph(costs_per_cell: np.ndarray, length_cost: float = 0.0, by_length: 
     free, rows, columns, costs = np.isfinite(plane), [], [], []
 
     def moved(field: np.ndarray, x: int, y: int, by: tuple[int, int]) -> np.ndarray:
-        """What lies `by` beside the cells from which a step (x, y) stays inside."""
+        """Return what lies `by` beside the cells from which a step (x, y) stays inside."""
         low_x, low_y = max(-x, 0) + by[0], max(-y, 0) + by[1]
         return field[low_x : low_x + size_x - abs(x), low_y : low_y + size_y - abs(y)]
 

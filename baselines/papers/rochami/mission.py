@@ -54,7 +54,7 @@ class TeamCoverage:
         self._shared.append(shared)
 
     def series(self) -> dict[str, list[float]]:
-        """`time_s`, `team_bits` and `shared_bits` at up to 100 moments, evenly in time."""
+        """Return `time_s`, `team_bits` and `shared_bits` at up to 100 moments, evenly in time."""
         time_s = np.asarray(self._times)
         grid = np.linspace(0.0, time_s[-1], _POINTS)
         rows = np.searchsorted(time_s, grid, side="right") - 1

@@ -192,7 +192,7 @@ def _lab(settings: dict[str, Any]) -> Scenario:
 
 
 def _merged(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
-    """Settings with others over them, part by part."""
+    """Return settings with others over them, part by part."""
     merged = dict(one)
     for name, value in other.items():
         both = isinstance(value, dict) and isinstance(merged.get(name), dict)

@@ -81,7 +81,7 @@ def teams_in(records: Records, part: str) -> tuple[int, ...]:
 
 
 def betas_in(records: Records, part: str) -> tuple[int, ...]:
-    """The β that were run in a part, in the paper's numbers."""
+    """Return the β that were run in a part, in the paper's numbers."""
     world, team = worlds_in(records, part)[0], teams_in(records, part)[0]
     return tuple(b for b in (*BETAS, *FARTHER_BETAS[part]) if cell_id(world, team, f"beta-{b}") in records)
 
@@ -139,7 +139,7 @@ def best_beta(
     among: Sequence[int] = BETAS,
     seeds: slice = _ALL,
 ) -> int:
-    """The β with the least mean time over worlds and team sizes; chosen from these same missions."""
+    """Return the β with the least mean time over worlds and team sizes; chosen from these same missions."""
     found = [beta for beta in betas_in(records, part) if beta in among]
     return min(found, key=lambda b: relative(records, part, f"beta-{b}", end, teams, worlds, seeds).mean())
 
@@ -247,7 +247,7 @@ def _our_claims(records: Records, part: str) -> list[Claim]:
 
 
 def changes_in(records: Records, part: str) -> dict[str, tuple[str, ...]]:
-    """What was changed in a part → the worlds in which it was."""
+    """Return what was changed in a part → the worlds in which it was."""
     found = {
         change: tuple(w for w in CHANGED_IN[part] if cell_id(w, CHANGED_TEAM, "ptv", change) in records)
         for change in CHANGES[part]

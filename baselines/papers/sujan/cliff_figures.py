@@ -101,7 +101,7 @@ def _outline(axes: Axes, plateau: np.ndarray, unreadable: np.ndarray) -> None:
 
 
 def _played(method: int, steps: int) -> tuple[EntropyExploreEnv, PlateauRule]:
-    """A mission in world 0 after some steps."""
+    """Return a mission in world 0 after some steps."""
     scenario = scenario_of(steps)
     env = scripted_env(scenario)
     strategy = make_strategy(METHODS[method])

@@ -50,7 +50,7 @@ def scenario_of(steps: int) -> Scenario:
 
 
 def start_of(scenario: Scenario) -> list[float]:
-    """The pose at which all missions start; map frame."""
+    """Return the pose at which all missions start; map frame."""
     height_m = scenario.plane_m(0)
     assert height_m is not None  # rovers keep theirs
     return [*START_M, height_m, 0.0, 0.0]

@@ -129,7 +129,7 @@ def _cell(count: int, reach: str, weight: float, worlds: int, scans: int) -> Cel
 
 
 def drifting(count: int, reach: str, scans: int) -> Scenario:
-    """The planar task for one robot that drifts."""
+    """Return the planar task for one robot that drifts."""
     return with_settings(
         scenario_of(1),
         {

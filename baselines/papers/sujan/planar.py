@@ -116,7 +116,7 @@ def _cell(robots: int, method: str, strategy: str, starts: int, run: Run) -> Cel
 
 
 def scenario_of(robots: int) -> Scenario:
-    """The task: a sensor of 90° and 15 m for one robot, of 75° and 10 m for two; a number of scans.
+    """Return the task: a sensor of 90° and 15 m for one robot, of 75° and 10 m for two; a number of scans.
 
     A drive leads wherever the robot wants, so that each decision is one scan, as in the paper.
     """

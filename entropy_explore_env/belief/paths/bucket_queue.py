@@ -58,7 +58,7 @@ def queue_bytes(entries: int) -> int:
 
 
 def new_queue(entries: int) -> BucketQueue:
-    """A queue with room for this many entries; the system provides the memory when it is first written."""
+    """Return a queue for this many entries; the system provides the memory when it is first written."""
     return BucketQueue(
         np.empty((_blocks(entries), _BLOCK_ENTRIES + 1), np.int32),
         np.empty((BUCKETS, 2), np.int32),

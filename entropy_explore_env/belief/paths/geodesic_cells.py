@@ -253,7 +253,7 @@ def _tessellate(space, starts, steps, per_cost, moves):
 def extract_path(
     space: Tessellation, traversal_cost: np.ndarray, voxel: int, length_cost: float, by_length: bool
 ) -> np.ndarray:
-    """The cheapest path from a cell's source to a voxel in it; it does not leave the cell.
+    """Return the cheapest path from a cell's source to a voxel in it; it does not leave the cell.
 
     Read off the costs backwards, without a search.
 

@@ -99,7 +99,7 @@ class Costs(NamedTuple):
 
 
 def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: int | None = None) -> Lattice:
-    """Steps of a ball-shaped body in a workspace.
+    """Return steps of a ball-shaped body in a workspace.
 
     A diagonal step is possible only if every voxel at the edges that it crosses is passable. The body fits
     where its footprint contains no covered voxel, as in `World.collision_mask`. Outside the workspace
@@ -170,7 +170,7 @@ def _footprint(shape: tuple[int, int, int], radius: float, layer: int | None) ->
 
 
 def _newly_touched(body: np.ndarray, step: tuple[int, ...]) -> np.ndarray:
-    """The offsets of a body that after a step are at none of its former places."""
+    """Return the offsets of a body that after a step are at none of its former places."""
     if not len(body):
         return body
     low = body.min(axis=0) - 1
@@ -244,7 +244,7 @@ def costs_of(per_edge: np.ndarray, min_per_edge: float) -> Costs:
 
 
 def _flat(field: np.ndarray) -> np.ndarray:
-    """A field by voxel number, read-only, so that kernels are compiled for one kind of array."""
+    """Return a field by voxel number, read-only, so that kernels are compiled for one kind of array."""
     flat = np.ascontiguousarray(field, np.float32).reshape(-1).view()
     flat.setflags(write=False)
     return flat

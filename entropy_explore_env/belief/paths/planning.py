@@ -288,7 +288,7 @@ def resume_search(search, lattice, costs, max_cost):
 def shortest_path(
     search: Search, lattice: Lattice, costs: Costs, start: int, goal: int, max_cost: float = math.inf
 ) -> tuple[float, np.ndarray]:
-    """The cheapest path from a voxel to another.
+    """Return the cheapest path from a voxel to another.
 
     Args:
         search: Memory of the search.

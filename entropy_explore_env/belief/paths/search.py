@@ -115,7 +115,7 @@ def cost_to(search, voxel):
 
 @inlined_kernel
 def _predecessor(search, lattice, voxel):
-    """The voxel from which a reached one was reached; -1 = the voxel is a source."""
+    """Return the voxel from which a reached one was reached; -1 = the voxel is a source."""
     code = ((np.int64(search.mark[voxel]) & STEP) >> STEP_SHIFT) - 1
     if code == NO_STEP:
         return _NONE

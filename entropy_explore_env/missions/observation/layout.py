@@ -80,7 +80,7 @@ class ObservationLayout:
         )
 
     def space(self) -> spaces.Space:
-        """A new space object of one robot's observation: a Dict of parts, or one Box."""
+        """Return a new space object of one robot's observation: a Dict of parts, or one Box."""
         if self.flat:
             return self.flat_space()
         return short_repr(spaces.Dict({name: _part_space(name, part) for name, part in self.parts.items()}))
@@ -93,7 +93,7 @@ class ObservationLayout:
         return short_repr(spaces.Box(low, high, dtype=np.float32))
 
     def split(self, vectors: np.ndarray) -> np.ndarray | dict[str, np.ndarray]:
-        """An observation from flat vectors (..., size) float32; parts are views of them."""
+        """Return an observation from flat vectors (..., size) float32; parts are views of them."""
         if self.flat:
             return vectors
         parts: dict[str, np.ndarray] = {}
@@ -103,7 +103,7 @@ class ObservationLayout:
         return parts
 
     def split_rows(self, rows: np.ndarray) -> list[np.ndarray] | list[dict[str, np.ndarray]]:
-        """The observations of robots one by one, from their flat vectors (A, size) float32."""
+        """Return the observations of robots one by one, from their flat vectors (A, size) float32."""
         together = self.split(rows)
         if isinstance(together, np.ndarray):
             return list(together)
@@ -111,7 +111,7 @@ class ObservationLayout:
 
 
 def short_repr(space: _Space) -> _Space:
-    """The space, whose text says the range of its bounds and not each of them."""
+    """Return the space, whose text says the range of its bounds and not each of them."""
     if isinstance(space, spaces.Dict):
         for part in space.spaces.values():
             short_repr(part)
@@ -186,7 +186,7 @@ def _candidate_parts(scenario: Scenario) -> dict[str, tuple[tuple[int, ...], flo
 
 
 def action_count(scenario: Scenario, rules: Rules) -> int:
-    """Number of actions where they are numbers."""
+    """Return number of actions where they are numbers."""
     if scenario.action.kind == "candidates":
         return scenario.action.candidates
     return len(rules.actions.moves) * len(rules.actions.gazes)
@@ -232,14 +232,14 @@ class CandidateOffsets(NamedTuple):
 
 
 def candidate_offsets(scenario: Scenario, layout: ObservationLayout) -> CandidateOffsets:
-    """What compiled code needs of a layout to write what is about candidates."""
+    """Return what compiled code needs of a layout to write what is about candidates."""
     names = ("candidates", "context", "overlaps", "action_mask")
     begin = [layout.parts[name].start if name in layout.parts else -1 for name in names]
     return CandidateOffsets(*begin, while_busy=scenario.observation.while_busy)
 
 
 def part_offsets(scenario: Scenario, layout: ObservationLayout) -> PartOffsets:
-    """What compiled code needs of a layout."""
+    """Return what compiled code needs of a layout."""
     begin = {name: part.start for name, part in layout.parts.items()}
     patch = scenario.observation.patch_shape
     if scenario.action.kind == "candidates":  # which are written elsewhere

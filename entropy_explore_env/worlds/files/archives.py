@@ -40,7 +40,7 @@ _SOME_SOLID = {"unknown": UNKNOWN, "unreadable": UNREADABLE}
 
 
 def saved(world: Voxels) -> bytes:
-    """The archive of a world."""
+    """Return the archive of a world."""
     entries: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
@@ -62,7 +62,7 @@ def saved(world: Voxels) -> bytes:
 
 
 def read(path: Path, options: Options) -> Voxels:
-    """A saved world, or the voxels of a height map."""
+    """Return a saved world, or the voxels of a height map."""
     entries = arrays(content(path))
     if "format" in entries:
         return _world(entries)
@@ -70,7 +70,7 @@ def read(path: Path, options: Options) -> Voxels:
 
 
 def restored(data: bytes) -> Voxels:
-    """The world whose archive `saved` made.
+    """Return the world whose archive `saved` made.
 
     Raises:
         RefusedError: As for `arrays`, or it holds no saved world.
@@ -82,7 +82,7 @@ def restored(data: bytes) -> Voxels:
 
 
 def arrays(data: bytes) -> dict[str, np.ndarray]:
-    """The arrays of an archive, whose sizes in header and archive must agree.
+    """Return the arrays of an archive, whose sizes in header and archive must agree.
 
     Raises:
         RefusedError: They are too many or too large, or hold objects. A broken archive raises whatever

@@ -48,7 +48,7 @@ def columns(
     options: Options,
     corner_m: tuple[float, float] = (0.0, 0.0),
 ) -> Voxels:
-    """The voxels of a height map.
+    """Return the voxels of a height map.
 
     Args:
         elevation_m: (X, Y) float64 samples, x to the east and y to the north; NaN or inf = unknown.
@@ -113,5 +113,5 @@ def _highest(samples: np.ndarray, rows: int, width: float) -> np.ndarray:
 
 
 def degrees_as_metres(step_x: float, step_y: float, latitude: float) -> tuple[float, float]:
-    """Steps in degrees of longitude and latitude as metres, on a sphere, at a latitude in degrees."""
+    """Return steps in degrees of longitude and latitude as metres, on a sphere, at a latitude in degrees."""
     return step_x * METRES_PER_DEGREE * math.cos(math.radians(latitude)), step_y * METRES_PER_DEGREE

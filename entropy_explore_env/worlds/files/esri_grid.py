@@ -20,7 +20,7 @@ _MAX_HEAD_LINES = 16
 
 
 def read(path: Path, options: Options) -> Voxels:
-    """The voxels of the grid."""
+    """Return the voxels of the grid."""
     lines = content(path).splitlines()
     about: dict[str, float] = {}
     for line in lines[:_MAX_HEAD_LINES]:

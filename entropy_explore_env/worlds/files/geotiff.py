@@ -54,7 +54,7 @@ class _Place(NamedTuple):
 
 
 def read(path: Path, options: Options) -> Voxels:
-    """The first page's elevation in metres."""
+    """Return the first page's elevation in metres."""
     import tifffile
 
     with tifffile.TiffFile(io.BytesIO(content(path))) as file:
@@ -112,7 +112,7 @@ def _heights_m(raw: np.ndarray, tags: Mapping[int, Any], keys: Mapping[str, Any]
 
 
 def _gdal_items(text: Any) -> dict[str, str]:  # noqa: ANN401 - whatever the tag holds
-    """What GDAL's metadata say of the first band: role → text."""
+    """Return what GDAL's metadata say of the first band: role → text."""
     if not isinstance(text, str) or not text.strip("\0 \r\n"):
         return {}
     items = ET.fromstring(text.strip("\0 \r\n"))

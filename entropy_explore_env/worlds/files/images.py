@@ -58,7 +58,7 @@ class Plan(NamedTuple):
 
 
 def read(path: Path, options: Options) -> Voxels:
-    """A plan, one voxel high, or a height map."""
+    """Return a plan, one voxel high, or a height map."""
     picture = opened(path)
     if picture.format == "PNG" and picture.mode.startswith("I"):
         step_m = options.get("elevation_step_m")
@@ -81,7 +81,7 @@ def read(path: Path, options: Options) -> Voxels:
 
 
 def limits(options: Options) -> tuple[float | None, float | None]:
-    """The options `occupied_below` and `free_above`: shades in [0, 255]; None = not given.
+    """Return the options `occupied_below` and `free_above`: shades in [0, 255]; None = not given.
 
     Raises:
         SettingError: They contradict each other.
@@ -94,7 +94,7 @@ def limits(options: Options) -> tuple[float | None, float | None]:
 
 
 def opened(path: Path) -> Image.Image:
-    """The image in a file, its pixels read; refused by the size in its header before that.
+    """Return the image in a file, its pixels read; refused by the size in its header before that.
 
     Raises:
         RefusedError: It is no image of a known kind, or has too many pixels.
@@ -122,7 +122,7 @@ def plan_of(
     opacity: str = "unknown",
     with_notes: bool = True,
 ) -> Plan:
-    """The plan that an image shows, cropped where nothing is free in large margins.
+    """Return the plan that an image shows, cropped where nothing is free in large margins.
 
     Args:
         picture: From `opened`.
@@ -162,7 +162,7 @@ def plan_of(
 
 
 def _notes(shades: np.ndarray, labels: np.ndarray, counts: np.ndarray, clear: int) -> list[str]:
-    """Notes on shades that look as if they were meant otherwise.
+    """Return notes on shades that look as if they were meant otherwise.
 
     Args:
         shades: (N,) of the levels of an image.

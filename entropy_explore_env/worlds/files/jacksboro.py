@@ -17,7 +17,7 @@ NAME = "jacksboro"
 
 
 def read(path: Path, options: Options) -> Voxels:
-    """The model's voxels; the path is its name."""
+    """Return the model's voxels; the path is its name."""
     del path
     from matplotlib import cbook
 

@@ -15,7 +15,7 @@ _POINTS_AT_ONCE = 1 << 20
 
 
 def read(path: Path, options: Options) -> Voxels:
-    """The voxels that a cloud's points lie in."""
+    """Return the voxels that a cloud's points lie in."""
     import laspy
 
     parts = [np.zeros((0, 3))]

@@ -47,7 +47,7 @@ _ROUNDING = 1e-6
 
 
 def read(path: Path, options: Options) -> Voxels:
-    """The plan, one voxel high; `origin` is the lower left corner of the image and its yaw."""
+    """Return the plan, one voxel high; `origin` is the lower left corner of the image and its yaw."""
     about = _about(path)
     resolution = _number(about, "resolution", lambda v: v > 0)
     free = _number(about, "free_thresh", lambda v: 0 <= v <= 1)
@@ -84,7 +84,7 @@ def labelling(
     strict: bool = False,
     given: tuple[float | None, float | None] = (None, None),
 ) -> Callable[[np.ndarray], np.ndarray]:
-    """A function from shades (N,) in [0, 255] to labels (N,) int8.
+    """Return a function from shades (N,) in [0, 255] to labels (N,) int8.
 
     Args:
         mode: One of MODES.
@@ -147,7 +147,7 @@ def _about(path: Path) -> dict[str, Any]:
 
 
 def _as_number(text: Any) -> float:  # noqa: ANN401 - texts, lists and mappings
-    """A finite number; NaN where it is none."""
+    """Return a finite number; NaN where it is none."""
     try:
         value = float(text) if isinstance(text, str) and "_" not in text else math.nan
     except ValueError:
@@ -181,7 +181,7 @@ def _origin(about: dict[str, Any]) -> tuple[float, float, float]:
 
 
 def _image(path: Path, about: dict[str, Any]) -> tuple[Path, tuple[str, ...]]:
-    """The image's path, and a note where it is not the one that the YAML names.
+    """Return the image's path, and a note where it is not the one that the YAML names.
 
     It must lie in the YAML's folder, or in that of the file which the YAML links to. Where the entry leads
     elsewhere, or differs in case, a file of that name beside the YAML is taken.

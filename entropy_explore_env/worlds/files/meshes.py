@@ -57,7 +57,7 @@ _HOLLOW = (
 
 
 def read(path: Path, options: Options) -> Voxels:
-    """The voxels of all meshes of a file, or of a PLY's points."""
+    """Return the voxels of all meshes of a file, or of a PLY's points."""
     import trimesh
 
     kind = path.suffix.lower()[1:]
@@ -75,7 +75,7 @@ def read(path: Path, options: Options) -> Voxels:
 
 
 def _axis_and_unit(data: bytes) -> tuple[str, float]:
-    """The axis of a DAE that points up, and its unit in metres."""
+    """Return the axis of a DAE that points up, and its unit in metres."""
     axis, unit = _UP_AXIS.search(data), _UNIT.search(data)
     up, unit_m = (axis[1].decode().lower() if axis else "y"), (float(unit[1]) if unit else 1.0)
     if up == "x" or not 0 < unit_m < math.inf:
@@ -120,7 +120,7 @@ def _voxels(mesh: Any, options: Options, up: str = "z", unit_m: float = 1.0) -> 
 
 
 def _surface(vertices: np.ndarray, faces: np.ndarray, voxel_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """The voxels that the corners of a surface, divided into small triangles, lie in.
+    """Return the voxels that the corners of a surface, divided into small triangles, lie in.
 
     Args:
         vertices: (N, 3) metres, moved so that voxels have their centres on multiples of their size.

@@ -57,7 +57,7 @@ class _Leaves(NamedTuple):
 
 
 def read(path: Path, options: Options) -> Voxels:
-    """The tree's voxels at the wanted size, or at its own resolution."""
+    """Return the tree's voxels at the wanted size, or at its own resolution."""
     data = content(path)
     tree = _tree(data)
     edge = float(tree.getResolution())
@@ -81,7 +81,7 @@ def read(path: Path, options: Options) -> Voxels:
 
 
 def _tree(data: bytes) -> Any:  # noqa: ANN401 - octomap has no types
-    """The tree in the bytes, whose nodes are counted before octomap reads them.
+    """Return the tree in the bytes, whose nodes are counted before octomap reads them.
 
     Where a file ends too early, octomap makes nodes of what it finds in its memory, at any depth, until there
     is no more of it. So it is given the nodes that are there, under a head of our own.
@@ -106,7 +106,7 @@ def _tree(data: bytes) -> Any:  # noqa: ANN401 - octomap has no types
 
 
 def _head_and_body(data: bytes, binary: bool) -> tuple[int, float, bytes]:
-    """The number of nodes and the resolution that a file states, and its nodes' bytes without colours."""
+    """Return the number of nodes and the resolution that a file states, and its nodes without colours."""
     found = _DATA_LINE.search(data)
     if found is None:
         raise RefusedError("a whole OctoMap tree")

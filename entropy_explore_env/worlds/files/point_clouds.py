@@ -50,7 +50,7 @@ class _Field(NamedTuple):
 
 
 def read(path: Path, options: Options) -> Voxels:
-    """The voxels that a PCD's points lie in."""
+    """Return the voxels that a PCD's points lie in."""
     data = content(path)
     found = _DATA.search(data[:_MAX_HEAD_BYTES])
     if found is None:
@@ -64,7 +64,7 @@ def read(path: Path, options: Options) -> Voxels:
 
 
 def _head(head: bytes, size: int) -> tuple[list[_Field], int]:
-    """The fields and the number of points that a head states, checked against the bytes of the file."""
+    """Return the fields and the number of points that a head states, checked against the file's bytes."""
     lines = head.decode("ascii", "replace").splitlines()
     words = {line.split()[0].upper(): line.split()[1:] for line in lines if line.strip()}
     names = words.get("FIELDS") or words["COLUMNS"]

@@ -77,7 +77,7 @@ USUAL = Limits()
 
 
 def _memory_bytes(limits: Limits, form: Format, size: int) -> int:
-    """The memory limit for a file of so many bytes."""
+    """Return the memory limit for a file of so many bytes."""
     mib: Any = limits.memory_mib
     if mib is None:
         mib = os.environ.get(READ_MEMORY_VARIABLE)
@@ -108,7 +108,7 @@ class ReaderProcess:
     def read(
         self, form: Format, path: Path | str, options: Mapping[str, Any], limits: Limits = USUAL
     ) -> Voxels:
-        """The voxels in a file.
+        """Return the voxels in a file.
 
         Args:
             form: The file's format.
@@ -189,7 +189,7 @@ class ReaderProcess:
         return self._process
 
     def _cause_of_death(self, form: Format, request: Mapping[str, Any], ended: bool) -> str:
-        """What is allowed, in the terms of an error: a file that does not end the process.
+        """Return what is allowed, in the terms of an error: a file that does not end the process.
 
         Args:
             form: The file's format.

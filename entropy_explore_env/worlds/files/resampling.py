@@ -21,7 +21,7 @@ from entropy_explore_env.worlds.files.voxels import (
 
 
 def resampled(voxels: Voxels, voxel_size_m: float | None) -> tuple[np.ndarray, np.ndarray | None]:
-    """The labels of voxels of a wanted size, and the ceiling counted in them.
+    """Return the labels of voxels of a wanted size, and the ceiling counted in them.
 
     A voxel is free if at least half of it is known to be free and less than a quarter of it is solid; of the
     others it is solid if at least a quarter of it is, and unreadable where most of what is solid is. A plan
@@ -91,7 +91,7 @@ def _pool(labels, scale, pooled):
 
 @lean_kernel
 def _lower(ceiling, scale, none, new_none, lowered):
-    """The lowest ceiling over each new column, in whole new voxels.
+    """Fill in the lowest ceiling over each new column, in whole new voxels.
 
     Args:
         ceiling: (X, Y) int32, lowest layer of the no-fly zone; `none` = no such layer.
@@ -110,5 +110,5 @@ def _lower(ceiling, scale, none, new_none, lowered):
 
 
 def extruded(plan: np.ndarray, layers: int) -> np.ndarray:
-    """A plan (X, Y, 1) repeated in all layers: (X, Y, layers) int8, contiguous."""
+    """Return a plan (X, Y, 1) repeated in all layers: (X, Y, layers) int8, contiguous."""
     return np.repeat(plan, layers, axis=2)

@@ -116,7 +116,7 @@ def cropped_note(shape: Sequence[int], box: tuple[slice, slice]) -> str:
 
 
 def memory_allowed(limit_bytes: int) -> str:
-    """What is allowed where reading took too much memory."""
+    """Return what is allowed where reading took too much memory."""
     limit = f"read within {limit_bytes >> 20} MiB of memory"
     return f"{limit} (read_memory_mib allows more, a larger voxel_size_m may need less)"
 
@@ -135,7 +135,7 @@ def content(path: Path) -> bytes:
 
 
 def checked_shape(extent: Sequence[float] | np.ndarray) -> tuple[int, int, int]:
-    """The shape that covers an extent (3,), in voxels; checked before an array of that size is made.
+    """Return the shape that covers an extent (3,), in voxels; checked before an array of that size is made.
 
     Raises:
         RefusedError: It is not finite, or too many voxels.

@@ -25,7 +25,7 @@ _ROOM_M = 4.2
 
 
 def bhattacharya_office(grid: Grid, rng: np.random.Generator) -> World:
-    """An office with a corridor that runs in a ring.
+    """Return an office with a corridor that runs in a ring.
 
     All free space in which a body of 0.3 m radius fits is connected. In 3-D, doors have lintels.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
@@ -43,3 +44,10 @@ RECIPES: Mapping[str, Callable[[Grid, np.random.Generator], World]] = MappingPro
     }
 )
 """Name of a recipe → World from a grid and a generator."""
+
+
+def about_recipe(name: str) -> str:
+    """Return what a recipe makes, by its docstring: a room with boxes."""
+    first = inspect.cleandoc(RECIPES[name].__doc__ or "").partition("\n\n")[0]
+    made = " ".join(first.split()).removeprefix("Return ")
+    return made[:1].upper() + made[1:]

@@ -39,7 +39,7 @@ _PILED, _PILE_M, _PILES_PER_M2 = 0.5, 0.4, 0.04
 
 
 def cliff(grid: Grid, rng: np.random.Generator) -> World:
-    """A plateau for x below the edge, rough ground beyond; all free space is connected.
+    """Return a plateau for x below the edge, rough ground beyond; all free space is connected.
 
     Args:
         grid: The workspace, in 3-D, at least 8 × 6 m and 4.5 m high, in voxels of 0.5 m at most.

@@ -27,7 +27,7 @@ _LOOPS = 0.25
 
 
 def corridor(grid: Grid, rng: np.random.Generator) -> World:
-    """A net of corridors; all of it is connected for a body of 0.3 m radius.
+    """Return a net of corridors; all of it is connected for a body of 0.3 m radius.
 
     Args:
         grid: The workspace, at least 8 × 4 m; in 3-D, corridors are as high as the workspace.
@@ -42,7 +42,7 @@ def corridor(grid: Grid, rng: np.random.Generator) -> World:
 
 
 def corridor_plan(shape: tuple[int, int], voxel_size_m: float, rng: np.random.Generator) -> Plan:
-    """The floor plan of a net of corridors.
+    """Return the floor plan of a net of corridors.
 
     Args:
         shape: Voxels along x and y, at least 4 m each, one of them 8 m.

@@ -9,7 +9,7 @@ from entropy_explore_env.worlds.world import World
 
 
 def empty(grid: Grid, rng: np.random.Generator) -> World:
-    """A workspace with nothing in it but its walls; nothing is drawn.
+    """Return a workspace with nothing in it but its walls; nothing is drawn.
 
     Args:
         grid: The workspace.

@@ -6,7 +6,7 @@ import numpy as np
 
 
 def fractal_noise(shape: tuple[int, ...], hurst: float, rng: np.random.Generator) -> np.ndarray:
-    """A self-affine random field: white noise whose spectrum is made to fall with the frequency.
+    """Return a self-affine random field: white noise whose spectrum is made to fall with the frequency.
 
     Amplitudes fall as 1/f^(H + n/2) in n dimensions, which gives a surface the fractal dimension n + 1 − H.
     The field is cut from a periodic one twice as large, so that opposite edges do not match.

@@ -17,7 +17,7 @@ _FURNITURE_SHARE = 0.08
 
 
 def furnished(grid: Grid, rng: np.random.Generator) -> World:
-    """A room with boxes on its floor, against each other or alone.
+    """Return a room with boxes on its floor, against each other or alone.
 
     Its free space is connected, also for bodies with a radius of up to half a voxel; larger ones may not
     reach all of it, and start in the largest component.

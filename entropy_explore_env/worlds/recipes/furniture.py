@@ -74,7 +74,7 @@ def furnish(
 
 
 def _place(room: Rectangle, kind: Piece, voxel_size_m: float, rng: np.random.Generator) -> Rectangle | None:
-    """A random position in the room, the long side along a wall; None if the room is too small."""
+    """Return a random position in the room, the long side along a wall; None if the room is too small."""
     axis = int(rng.integers(2))
     size = [0, 0]
     size[axis], size[1 - axis] = voxels(kind.length_m, voxel_size_m), voxels(kind.depth_m, voxel_size_m)

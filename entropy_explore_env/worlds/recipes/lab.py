@@ -18,7 +18,7 @@ _AREA_A_PIECE_M2 = 3.0
 
 
 def lab(grid: Grid, rng: np.random.Generator) -> World:
-    """A room with benches, cupboards and boxes.
+    """Return a room with benches, cupboards and boxes.
 
     All free space in which a body of 0.3 m radius fits is connected, in space and in every layer.
 

@@ -54,7 +54,7 @@ def office(grid: Grid, rng: np.random.Generator) -> World:
 
 
 def office_plan(shape: tuple[int, int], voxel_size_m: float, rng: np.random.Generator) -> Plan:
-    """The floor plan of an office; corridors run along its longer side.
+    """Return the floor plan of an office; corridors run along its longer side.
 
     Args:
         shape: Voxels along x and y, at least 6 m each.
@@ -89,7 +89,7 @@ def office_plan(shape: tuple[int, int], voxel_size_m: float, rng: np.random.Gene
 
 
 def _wings(length: int, wing: int, corridor: int, rng: np.random.Generator) -> list[tuple[int, int]]:
-    """A building's length cut by cross corridors, at least one, none of them at an end."""
+    """Return a building's length cut by cross corridors, at least one, none of them at an end."""
     parts = divided(0, length, wing, corridor, rng)
     if len(parts) > 1:
         return parts

@@ -42,7 +42,7 @@ class Rectangle(NamedTuple):
         return self.high[axis] - self.low[axis]
 
     def within(self, axis: int, low: int, high: int) -> Rectangle:
-        """The same rectangle with another extent along one axis."""
+        """Return the same rectangle with another extent along one axis."""
         lows, highs = list(self.low), list(self.high)
         lows[axis], highs[axis] = low, high
         return Rectangle((lows[0], lows[1]), (highs[0], highs[1]))
@@ -98,12 +98,12 @@ class Plan:
 
 
 def bare_plan(shape: tuple[int, ...], voxel_size_m: float, wall_m: float = WALL_M) -> Plan:
-    """An empty plan (X, Y)."""
+    """Return an empty plan (X, Y)."""
     return Plan(np.zeros(shape[:2], bool), np.zeros(shape[:2], bool), voxel_size_m, wall_m)
 
 
 def voxels(length_m: float, voxel_size_m: float) -> int:
-    """A length in whole voxels, at least one."""
+    """Return a length in whole voxels, at least one."""
     return max(1, round(length_m / voxel_size_m))
 
 
@@ -130,7 +130,7 @@ def require_size(grid: Grid, kind: str, *edges_m: float) -> None:
 
 
 def divided(low: int, high: int, part: float, gap: int, rng: np.random.Generator) -> list[tuple[int, int]]:
-    """An interval divided into parts of about equal length, with gaps between them.
+    """Return an interval divided into parts of about equal length, with gaps between them.
 
     Args:
         low: First voxel.
@@ -179,7 +179,7 @@ def put_rooms(
 
 
 def extruded(grid: Grid, solid: np.ndarray, doors: Sequence[Rectangle] = ()) -> np.ndarray:
-    """A plan extruded to the height of the grid, with wall above its doors from `DOOR_HEIGHT_M` on.
+    """Return a plan extruded to the height of the grid, with wall above its doors from `DOOR_HEIGHT_M` on.
 
     Args:
         grid: The workspace.

@@ -71,7 +71,7 @@ def _ground(grid: Grid, rng: np.random.Generator, hurst: float, name: str) -> Wo
 
 
 def exposure_surface(ground: np.ndarray, layers: int, air: int, voxel_size_m: float) -> np.ndarray:
-    """The lowest layer of each column that robots must not enter.
+    """Return the lowest layer of each column that robots must not enter.
 
     Args:
         ground: (X, Y) int32, solid layers of each column.

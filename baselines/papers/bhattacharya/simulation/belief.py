@@ -128,7 +128,7 @@ def _fuse(
 
 @lean_kernel
 def _filter(raw: np.ndarray, entropy: np.ndarray, window: np.ndarray) -> None:
-    """The least of 3 × 3 cells, in the window and one cell around it."""
+    """Fill in the least of 3 × 3 cells, in the window and one cell around it."""
     size_x, size_y = raw.shape[0], raw.shape[1]
     for x in range(max(window[0] - 1, 0), min(window[1] + 1, size_x)):
         for y in range(max(window[2] - 1, 0), min(window[3] + 1, size_y)):

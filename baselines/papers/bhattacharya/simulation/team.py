@@ -115,7 +115,7 @@ class Planner:
             self.targets = np.where(np.array(near) == UNREACHED, self.targets, near)
 
     def functionals(self) -> np.ndarray:
-        """(A,) the coverage functional of each cell."""
+        """Return (A,) the coverage functional of each cell."""
         if self._functionals is None:
             arrays = self.space.cells, self.space.costs, self.density
             found = [coverage_functional(*arrays, robot)[0] for robot in range(self._robots)]
@@ -127,7 +127,7 @@ class Planner:
         return extract_path(self.space, self.cell_costs, voxel, *self._metric)
 
     def covering_step(self, robot: int, place: int) -> int:
-        """The next cell of a robot that covers a region without uncertain cells."""
+        """Return the next cell of a robot that covers a region without uncertain cells."""
         cell = self.space.cells == robot
         if not cell.any():  # another robot is in the same place, and comes first
             return place
@@ -252,7 +252,7 @@ class Simulation:
         )  # messages may be in flight
 
     def _known_places(self, robot: int) -> np.ndarray:
-        """(A,) where a robot believes the team to be."""
+        """Return (A,) where a robot believes the team to be."""
         if len(self.planners) == 1:
             return self.places
         self._last_heard_at[robot, robot] = self.places[robot]
@@ -288,7 +288,7 @@ class Simulation:
                 self._received[sender, mate] = True
 
     def _step_of(self, robot: int) -> int:
-        """The cell to which a robot steps in this iteration."""
+        """Return the cell to which a robot steps in this iteration."""
         planner, place = self.planners[robot if len(self.planners) > 1 else 0], int(self.places[robot])
         if self.rules.keeps_targets and not planner.explored and self._keeps_target(planner, robot):
             step = int(self._paths[robot][0])
