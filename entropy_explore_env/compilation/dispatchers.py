@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import gc
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -137,6 +137,11 @@ def _shared_flags(flags: compiler.Flags) -> KernelFlags:
 class KernelCompiler(compiler.Compiler):
     """Numba's compiler; other kernels that it calls come first, and symbols get the name of the file."""
 
+    @property
+    def lowering(self) -> type[NativeLowering]:
+        """The pass that makes LLVM's code."""
+        return OuterLowering
+
     def define_pipelines(self) -> list[PassManager]:
         """Return Numba's passes and one more."""
         name = _state.kernels[-1].name
@@ -154,19 +159,22 @@ class KernelCompiler(compiler.Compiler):
         for step, text in passes:
             if step is NopythonTypeInference:
                 yield CalleesFirst, "compile what it calls"
-            yield step, text
+            yield (self.lowering if step is NativeLowering else step), text
 
 
 class InnerKernelCompiler(KernelCompiler):
     """The same, up to the intermediate code, without passes that lean kernels have no use for."""
 
+    @property
+    def lowering(self) -> type[NativeLowering]:
+        """The pass that makes LLVM's code."""
+        return InnerLowering
+
     def passes_from(self, passes: list[tuple[Any, str]]) -> Iterator[tuple[Any, str]]:
         """Yield the passes, each with a text."""
         lean = not self.state.flags.nrt
         for step, text in super().passes_from(passes):
-            if step is NativeLowering:
-                yield InnerLowering, text
-            elif not (lean and step.__name__ in UNUSED_PASSES):
+            if not (lean and step.__name__ in UNUSED_PASSES):
                 yield step, text
 
 
@@ -252,6 +260,45 @@ class InnerLibrary(JITCodeLibrary):
         library._final_module = llvm.parse_bitcode(bitcode)
         library._finalize_final_module()
         return library
+
+
+class OuterLibrary(JITCodeLibrary):
+    """The machine code of what Python calls, kept on disk without intermediate code: nothing links it."""
+
+    def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
+        """Return what is kept of it: the machine code, and the names that it defines."""
+        self._ensure_finalized()
+        return self.name, "object", (self._get_compiled_object(), _names_alone(self._final_module))
+
+
+def _names_alone(module: Any) -> bytes:  # noqa: ANN401 - of LLVM
+    """The bitcode of a module that defines the same names and holds nothing else."""
+    functions = [f"define void @{_quoted(one.name)}() {{ ret void }}" for one in _defined(module.functions)]
+    variables = [f"@{_quoted(one.name)} = global i8 0" for one in _defined(module.global_variables)]
+    return llvm.parse_assembly("\n".join(functions + variables)).as_bitcode()
+
+
+def _defined(values: Iterable[Any]) -> Iterator[Any]:
+    return (value for value in values if not value.is_declaration)
+
+
+def _quoted(name: str) -> str:
+    """A name in LLVM's assembly."""
+    letters = (chr(byte) if chr(byte).isalnum() else f"\\{byte:02x}" for byte in name.encode())
+    return f'"{"".join(letters)}"'
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class OuterLowering(NativeLowering):
+    """Lowers into an `OuterLibrary`."""
+
+    _name = "outer_lowering"
+
+    def run_pass(self, state: Any) -> bool:  # noqa: ANN401 - Numba's bag of everything
+        """Lower as Numba does."""
+        state.library = OuterLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return super().run_pass(state)
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)

@@ -26,6 +26,9 @@ from entropy_explore_env.worlds.sight import driven_up_to, visible_from
 from entropy_explore_env.worlds.splits import draw_world_number
 from entropy_explore_env.worlds.world import World
 
+_FILLED_WHOLE = ("truth", "collision", "mean", "precision")
+"""Arrays that a start fills with something else than zeros: worlds, and beliefs at the prior."""
+
 
 class FixedWorlds(NamedTuple):
     """Worlds that no recipe makes anew."""
@@ -102,8 +105,9 @@ def fill_start(scenario: Scenario, rules: Rules, state: MissionState, start: Sta
     """
     mission, seed, episode, world = start.mission, start.seed, start.episode, start.world
     prior = rules.params["prior_precision"][0]
-    for array in state[4:]:
-        array[mission] = np.zeros((), array.dtype)
+    for name, array in state._asdict().items():
+        if name not in _FILLED_WHOLE:
+            array[mission] = np.zeros((), array.dtype)
     state.mean[mission], state.precision[mission] = PRIOR_MEAN, prior
     state.pooled[mission] = fresh_sums(rules.cells)
     if scenario.track_truth:

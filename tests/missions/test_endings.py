@@ -1,4 +1,4 @@
-"""When maps end a mission: one of them, or all."""
+"""What ends a mission: one map, all of them, what the team shares, what it has seen, time or cycles."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.missions.records import MissionEnd
-from tests.reference.scenes import free_box, started
+from tests.reference.scenes import free_box, started, wander
+
+SHARES = {"i_min_bits": 0.0}
 
 
 @pytest.mark.parametrize(
@@ -26,3 +28,131 @@ def test_a_mission_ends_at_the_first_event_at_which_enough_maps_are_complete(ter
     missions.state.robots["entropy_bits"][0] = np.where(complete, enough_bits, enough_bits + 1e6)
     missions.step(np.zeros((1, 2, 5)), np.zeros((1, 2), np.int64))
     assert missions.over(0) is end
+
+
+def maps_passed(missions):
+    """(A,) whether each robot's map has passed the threshold."""
+    return missions.state.robots["entropy_bits"][0] <= missions.state.missions["entropy_end_bits"][0]
+
+
+def play(scenario, seed=0, steps=4000):
+    """A mission of random actions until its end, and which maps had passed before its last step."""
+    missions, before = started(scenario, seed), np.zeros(scenario.robots, bool)
+    rng = np.random.default_rng(seed)
+    for _ in range(steps):
+        if missions.over(0) is not MissionEnd.RUNNING:
+            break
+        before = maps_passed(missions)
+        missions.step(rng.uniform(-1, 1, (1, scenario.robots, 5)), np.zeros((1, scenario.robots), np.int64))
+    return missions, before
+
+
+@pytest.mark.parametrize("channel", [SHARES, {"burst": 0}])
+def test_without_faults_all_maps_have_to_be_complete(channel):
+    ends = {}
+    for termination in ("any", "all", "shared"):
+        scenario = free_box(robots=3, channel=channel, ending={"termination": termination, "sigma_end": 0.2})
+        missions, before = play(scenario)
+        assert missions.over(0) is MissionEnd.MAPPED
+        passed = maps_passed(missions)
+        assert passed.any() if termination == "any" else passed.all()
+        assert not before.all() and (termination != "any" or not before.any())
+        ends[termination] = float(missions.state.missions["time_s"][0])
+    assert ends["any"] <= ends["all"] == ends["shared"]
+
+
+def test_robots_that_have_stopped_for_good_do_not_count():
+    faults = {"stop": {"at_s": 3.0, "robots": (1,)}}
+    ending = {"sigma_end": 0.2, "time_limit_s": 2000.0}
+    shared, _ = play(
+        free_box(robots=3, faults=faults, channel=SHARES, ending={**ending, "termination": "shared"})
+    )
+    assert shared.over(0) is MissionEnd.MAPPED and maps_passed(shared).tolist() == [True, False, True]
+    everybody, _ = play(
+        free_box(robots=3, faults=faults, channel=SHARES, ending={**ending, "termination": "all"})
+    )
+    assert everybody.over(0) is MissionEnd.TIME_UP
+
+
+def test_a_robot_that_stands_still_for_a_while_counts():
+    faults = {"stop": {"at_s": 3.0, "lasts_s": 500.0, "robots": (1,)}}
+    ending = {"sigma_end": 0.2, "termination": "shared"}
+    missions, _ = play(free_box(robots=3, faults=faults, channel=SHARES, ending=ending))
+    assert missions.over(0) is MissionEnd.MAPPED and missions.state.missions["time_s"][0] > 503.0
+    assert maps_passed(missions).all()
+
+
+@pytest.mark.parametrize("goal", [{"seen_share": 0.7}, {"unseen_free_voxels": 60}])
+def test_what_was_seen_has_to_be_in_every_map(goal):
+    """The slow reference counts the voxels that each map holds."""
+
+    def held(missions):
+        state, prior = missions.state, missions.rules.params["prior_precision"][0]
+        seen = (state.precision[0] > np.float32(prior)) & state.visible[0]
+        free = seen & (state.truth[0] <= 0.5)
+        clock = state.missions[0]
+        return (seen.sum(axis=1) >= clock["explored_end"]) & (free.sum(axis=1) >= clock["explored_free_end"])
+
+    together, _ = play(free_box(robots=3, channel={"burst": 2}, ending=goal))
+    assert together.over(0) is MissionEnd.SEEN and not held(together).all()
+    scenario = free_box(robots=3, channel={"burst": 2}, ending={**goal, "termination": "shared"})
+    missions, told = started(scenario), []
+    rng = np.random.default_rng(0)
+    while missions.over(0) is MissionEnd.RUNNING:
+        told.append(bool(held(missions).all()))
+        missions.step(rng.uniform(-1, 1, (1, 3, 5)), np.zeros((1, 3), np.int64))
+    assert missions.over(0) is MissionEnd.SEEN and held(missions).all() and not any(told)
+    assert missions.state.missions["time_s"][0] > together.state.missions["time_s"][0]
+
+
+def test_shared_knowledge_needs_a_robot_that_works():
+    """All stop at once: nobody has shared anything."""
+    missions = started(free_box(robots=2, faults={"stop": {"at_s": 2.0}}, ending={"termination": "shared"}))
+    wander(missions, 20, 0)
+    assert missions.over(0) is MissionEnd.STOPPED
+
+
+def test_a_mission_ends_with_the_first_scan_that_brings_one_map_below_the_threshold():
+    missions = started(free_box(ending={"sigma_end": 15.0}, channel={"burst": 0}), seed=5)
+    threshold, robots = missions.state.missions[0]["entropy_end_bits"], missions.state.robots[0]
+    before = robots["entropy_bits"].copy()
+    while missions.over(0) is MissionEnd.RUNNING:
+        assert (robots["entropy_bits"] > threshold).all()
+        before = robots["entropy_bits"].copy()
+        wander(missions, 1, missions.state.missions[0]["cycles"])
+    assert missions.over(0) is MissionEnd.MAPPED
+    assert robots["entropy_bits"].min() <= threshold < before.min()
+    assert robots["entropy_bits"].max() > threshold  # the other map is not that far yet
+
+
+def test_all_maps_below_the_threshold():
+    settings = {"ending": {"sigma_end": 20.0, "termination": "all"}, "channel": {"burst": 0}}
+    missions = started(free_box(**settings), seed=5)
+    threshold, robots = missions.state.missions[0]["entropy_end_bits"], missions.state.robots[0]
+    one_alone = False
+    while missions.over(0) is MissionEnd.RUNNING:
+        one_alone |= bool((robots["entropy_bits"] <= threshold).sum() == 1)
+        wander(missions, 1, missions.state.missions[0]["cycles"])
+    assert missions.over(0) is MissionEnd.MAPPED
+    assert one_alone
+    assert (robots["entropy_bits"] <= threshold).all()
+
+
+@pytest.mark.parametrize("period", [None, 0.8])
+def test_a_mission_is_cut_off_at_its_time_limit(period):
+    missions = started(free_box(decision_period_s=period, ending={"time_limit_s": 7.3}), seed=5)
+    while missions.over(0) is MissionEnd.RUNNING:
+        assert missions.state.missions[0]["time_s"] < 7.3
+        wander(missions, 1, 0)
+    assert missions.over(0) is MissionEnd.TIME_UP
+    assert missions.state.missions[0]["time_s"] == 7.3
+
+
+def test_a_mission_is_cut_off_after_its_last_cycle_and_then_stands_still():
+    missions = started(free_box(ending={"max_cycles": 6}), seed=5)
+    wander(missions, 6, 0)
+    assert missions.over(0) is MissionEnd.CYCLES_UP
+    before = [array.tobytes() for array in missions.state]
+    wander(missions, 2, 1)
+    assert [array.tobytes() for array in missions.state] == before
+    assert missions.state.missions[0]["cycles"] == 6

@@ -23,7 +23,7 @@ from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.robots.motion import MoveEnd
 from tests.missions.replays import check_replay
 from tests.missions.test_tick import toward
-from tests.reference.scenes import build, free_box, put, random_actions, started, wander
+from tests.reference.scenes import free_box, put, random_actions, started, wander
 
 HERE, FAR, STAY = (1.75, 1.75, 1.25, 0.0, 0.0), (1.75, 2.75, 1.25, 0.0, 0.0), (0.75, 4.75, 1.25, 0.0, 0.0)
 AT_ONCE = {"turn_rate_rad_s": math.inf}
@@ -351,45 +351,6 @@ def test_infos_say_who_fails_now():
     assert [one for one, _ in told] == [right, left, left, right]
     assert [other for _, other in told] == [right, right, [False, False, True], [False, False, True]]
     assert [np.transpose(each).tolist() for each in batched] == told
-
-
-def test_signals_and_sight_decide_who_hears():
-    """A wall of one voxel between two robots that are 2 m apart: 16.02 dB in the open, and 10 m of 30 dB."""
-    solid = np.zeros((7, 11, 5), bool)
-    solid[:, 6] = True
-    heard = {}
-    channels = {
-        "distance": {},
-        "line_of_sight": {"reach": "line_of_sight"},
-        "through": {"reach": "signal", "signal": {"exponent": 2.0, "budget_db": 22.0}},
-        "not through": {"reach": "signal", "signal": {"exponent": 2.0, "budget_db": 21.0}},
-        "too far": {"reach": "signal", "range_m": 1.9, "signal": {"budget_db": 280.0}},
-    }
-    for name, channel in channels.items():
-        for wall in (False, True):
-            missions = started(free_box(robot=AT_ONCE, channel={"i_min_bits": 0.0, **channel}))
-            if wall:
-                build(missions, solid)
-            put(missions, 0, (1.75, 2.25, 1.25, 0.0, 0.0))
-            put(missions, 1, (1.75, 4.25, 1.25, 0.0, 0.0))
-            for _ in range(2):
-                robots = toward(missions, (1.75, 2.25, 1.25, 0.0, 0.0), (1.75, 4.25, 1.25, 0.0, 0.0))
-            reached = robots["messages_received"] > 0
-            assert (robots["messages_out_of_range"] > 0).tolist() == (~reached).tolist()
-            assert reached[0] == reached[1]
-            heard[name, wall] = bool(reached[0])
-    assert heard == {
-        ("distance", False): True,
-        ("distance", True): True,
-        ("line_of_sight", False): True,
-        ("line_of_sight", True): False,
-        ("through", False): True,
-        ("through", True): True,
-        ("not through", False): True,
-        ("not through", True): False,
-        ("too far", False): False,
-        ("too far", True): False,
-    }
 
 
 def test_a_state_of_a_sensor_that_measures_much_too_far_is_one_that_missions_have():

@@ -20,6 +20,12 @@ HERE, THERE = (0.75, 0.75, 1.25, 0.0, 0.0), (2.75, 0.75, 1.25, 0.0, 0.0)
         ({"range_m": 1.9}, False, False),
         ({"range_m": 2.1, "reach": "line_of_sight"}, True, False),
         ({"range_m": 1.9, "reach": "line_of_sight"}, False, False),
+        # 6.02 dB for two metres, and 15 dB for half a metre of wall
+        ({"reach": "signal", "signal": {"exponent": 2.0, "budget_db": 22.0}}, True, True),
+        ({"reach": "signal", "signal": {"exponent": 2.0, "budget_db": 21.0}}, True, False),
+        ({"reach": "signal", "signal": {"exponent": 2.0, "budget_db": 21.0}}, False, True),
+        ({"reach": "signal", "signal": {"exponent": 2.0, "budget_db": 6.0}}, False, False),
+        ({"reach": "signal", "range_m": 1.9, "signal": {"budget_db": 280.0}}, False, False),
     ],
 )
 def test_a_message_passes_or_is_counted_as_out_of_range(channel, wall, heard):

@@ -91,6 +91,15 @@ def free_box(**changes: Any) -> Scenario:
     return with_settings(BOX, {"decision_period_s": None, **changes})
 
 
+TIGHT = free_box(
+    robots=5,
+    robot={"body_radius_m": 0.35, "reach_m": 3.0},
+    decision_period_s=0.6,
+    observation={"panorama": False, "self_state": False, "team": False},
+)
+"""Five large bodies in a small box."""
+
+
 def started(scenario: Scenario, seed: int = 0, missions: int = 1) -> Missions:
     """Missions after their reset, mission m with seed + m."""
     these = Missions(scenario, missions)
