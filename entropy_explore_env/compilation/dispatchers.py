@@ -272,7 +272,7 @@ class OuterLibrary(JITCodeLibrary):
 
 
 def _names_alone(module: Any) -> bytes:  # noqa: ANN401 - of LLVM
-    """The bitcode of a module that defines the same names and holds nothing else."""
+    """Return the bitcode of a module that defines the same names and holds nothing else."""
     functions = [f"define void @{_quoted(one.name)}() {{ ret void }}" for one in _defined(module.functions)]
     variables = [f"@{_quoted(one.name)} = global i8 0" for one in _defined(module.global_variables)]
     return llvm.parse_assembly("\n".join(functions + variables)).as_bitcode()
@@ -283,7 +283,7 @@ def _defined(values: Iterable[Any]) -> Iterator[Any]:
 
 
 def _quoted(name: str) -> str:
-    """A name in LLVM's assembly."""
+    """Return a name as LLVM's assembly writes it."""
     letters = (chr(byte) if chr(byte).isalnum() else f"\\{byte:02x}" for byte in name.encode())
     return f'"{"".join(letters)}"'
 
