@@ -123,7 +123,7 @@ def filmed(scenario: Scenario, strategy: str, seed: int, pictures: int) -> Film:
         scenario: The task.
         strategy: Name of the strategy.
         seed: Of the mission.
-        pictures: At most so many, spread evenly.
+        pictures: Largest number, spread evenly.
     """
     painter, film = Painter("rgb_array"), Film(pictures)
 

@@ -103,7 +103,7 @@ class Loop:
 def learning_rounds(
     threads: Sequence[int], rounds: int, words: tuple[str, ...] = ()
 ) -> dict[int, list[Round]]:
-    """Learn on so many threads each, taking turns; a rollout of each before warms up."""
+    """Learn on this many threads each, taking turns; a rollout of each before warms up."""
     with tempfile.TemporaryDirectory() as folder:
         loops = {count: Loop(count, words, Path(folder)) for count in threads}
         found: dict[int, list[Round]] = {count: [] for count in threads}

@@ -130,7 +130,7 @@ _MAPPED_IN_TIME = 0.8
 def _register() -> None:
     """Register every named scenario with Gymnasium and PettingZoo.
 
-    A robot on its own waits for nobody: under Gymnasium a step lasts until it may decide again. Every
+    A robot on its own waits for no other: under Gymnasium a step lasts until it may decide again. Every
     decision is followed by a scan, so that a mission has at most `max_episode_steps` of them; where settings
     change that, `gymnasium.make(..., max_episode_steps=-1)` leaves the end to the mission.
     """

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 _OURS = "entropy_explore_env"
 _FOR_DEVELOPERS = ("test", "dev")
-"""Extras for who works on the project: left out."""
+"""Extras for developers of the project: left out."""
 _WRITTEN = re.compile(r"([\w.-]+)\s*(?:\[([^]]*)\])?([^;]*)(?:;(.*))?")
 _PIN = re.compile(r"==\s*([\w.]+)$")
 _CLAUSE = re.compile(r"""(\w+)\s*([<>=!]+)\s*["']([^"']*)["']""")

@@ -1,7 +1,7 @@
 """Ctrl-C while a command still imports what it needs: one line and the exit code that it has later, too.
 
 Imported first. `python -m` imports the packages around a module before it runs it; only then is its first
-word "-m", so that who imports the library gets no hook.
+word "-m", so that programs that import the library get no hook.
 """
 
 from __future__ import annotations

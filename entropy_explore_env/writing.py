@@ -26,6 +26,6 @@ def write_atomically(path: Path, content: bytes | str) -> None:
         Path(temporary).replace(path)
     except BaseException as error:
         Path(temporary).unlink(missing_ok=True)
-        if isinstance(error, OSError):  # a full disk has no name, and nobody knows the temporary file's
+        if isinstance(error, OSError):  # a full disk has no name, and the temporary file's says nothing
             raise OSError(error.errno, error.strerror, str(path)) from None
         raise

@@ -1,4 +1,4 @@
-"""Docstrings of the API's pages: their sections begin at the margin, where Napoleon looks for them."""
+"""Docstrings of the API's pages: their sections begin at the margin, and words that readers stumble over."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import pytest
 
 import entropy_explore_env
-from tests.code_blocks import DOCS
+from tests.code_blocks import DOCS, ROOT
 
 _DOCUMENTED = re.compile(r"^\.\. auto(?:class|function):: (\S+)$", flags=re.MULTILINE)
 _SECTION = re.compile(r"^( *)(?:Args|Returns|Yields|Raises|Attributes|Note|Example):$", flags=re.MULTILINE)
@@ -46,3 +46,20 @@ def test_sections_of_docstrings_begin_at_the_margin():
 )
 def test_an_indented_section_is_found(text, heads):
     assert indented_sections(text) == heads
+
+
+GONE = r"\b(dregs|clairvoyant|thinned|doubtful|nobody|so many|nothing is none|what is nothing)\b"
+"""Words that are not the field's, or not plain English."""
+
+
+def test_words_that_readers_stumble_over_stay_away():
+    packages = ("entropy_explore_env", "baselines", "training", "benchmarks")
+    files = [path for package in packages for path in (ROOT / package).rglob("*.py")]
+    files += [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")]
+    files += [*DOCS.glob("*.md"), *(DOCS / "tutorials").glob("*.md"), *(DOCS / "api").glob("*.md")]
+    found = {
+        f"{path.relative_to(ROOT)}: {word}"
+        for path in files
+        for word in re.findall(GONE, path.read_text("utf-8"), flags=re.IGNORECASE)
+    }
+    assert len(files) > 300 and found == set()

@@ -58,7 +58,7 @@ def check_width(width: int) -> None:
 
 
 def check_attention_layers(layers: int) -> None:
-    """Raise a SettingError unless networks may have so many layers of attention."""
+    """Raise a SettingError unless networks may have this many layers of attention."""
     if not is_whole(layers, 0, _MOST_LAYERS):
         raise SettingError("attention_layers", layers, f"a whole number from 0 to {_MOST_LAYERS}")
 

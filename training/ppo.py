@@ -458,7 +458,7 @@ class DecisionPPO(PPO):
     """
 
     def start(self, total_steps: int, callback: BaseCallback) -> BaseCallback:
-        """Prepare a loop of rollouts and updates up to so many steps, as `learn` does."""
+        """Prepare a loop of rollouts and updates up to this many steps, as `learn` does."""
         _, callback = self._setup_learn(total_steps - self.num_timesteps, callback, reset_num_timesteps=False)
         return callback
 

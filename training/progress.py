@@ -57,7 +57,7 @@ class Progress:
         self.seconds["processor_s"] += time.process_time() - processor_s
 
     def add_validation(self, steps: int, validation: Validation) -> bool:
-        """Note a validation after so many steps; whether its mission time is the shortest so far."""
+        """Note a validation after this many steps; whether its mission time is the shortest so far."""
         row = {"steps": steps, **dataclasses.asdict(validation)}
         self.curve.append({"steps": steps, **self.seconds, **dataclasses.asdict(validation)})
         if self.best and validation.mean_s >= self.best["mean_s"]:
@@ -66,7 +66,7 @@ class Progress:
         return True
 
     def validated(self, steps: int) -> bool:
-        """Whether the latest validation was after so many steps."""
+        """Whether the latest validation was after this many steps."""
         return bool(self.curve) and self.curve[-1]["steps"] == steps
 
     def curve_csv(self) -> str:
@@ -159,7 +159,7 @@ class TrainingBar:
             self.say(f"{steps:>12,} steps: validating in {missions:,} missions")
 
     def show_validation(self, steps: int, validation: Validation) -> None:
-        """Print what the validation after so many steps found."""
+        """Print what the validation after this many steps found."""
         self._bar.update(self._task, latest=f"missions take {validation.median_s:,.0f} s")
         ratio = validation.planner_ratio
         beside = "" if ratio is None else f", {ratio:.3f} times as long as the planner's"

@@ -60,7 +60,7 @@ def median_interval(values: Sample) -> Interval:
 
 
 def small_mean_range(values: Sample, missions: int) -> Range:
-    """Where 95 % of the means of only so many missions lie."""
+    """Where 95 % of the means of only this many missions lie."""
     return _central(_resampled(np.asarray(values, float), missions).mean(axis=1))
 
 

@@ -63,7 +63,7 @@ _MOST_EDGE, _USUAL_EDGE, _ONE_IN = 5000, 500, 16
 
 @cache
 def packed_zeros(count: int) -> bytes:
-    """So many zeros, compressed: a bomb."""
+    """Return this many zeros, compressed: a bomb."""
     return zlib.compress(bytes(count), 9)
 
 

@@ -1,7 +1,7 @@
 """Named scenarios over every channel for a long time: the contract holds, and memory does not grow.
 
 At each step observations are in their space, rewards are finite, time does not run backwards, ends are told,
-and the bits gained are those by which entropy fell; every so many steps, each number of the state is in its
+and the bits gained are those by which entropy fell; at set intervals, each number of the state is in its
 range.
 """
 

@@ -20,7 +20,7 @@ from entropy_explore_env.settings.validation import is_number
 _SWEEPS_AT_ONCE, _ROWS_AT_ONCE = 6, 32
 """Sweeps that go over the rows together, and rows of each before the next one: what is fastest."""
 _SWEEPS_PER_CELL = 40
-"""Relaxation ends after so many sweeps for each cell of the widest gap, whatever is left of its changes."""
+"""Relaxation ends after this many sweeps for each cell of the widest gap, whatever is left of its changes."""
 
 
 class ElevationMap(NamedTuple):
@@ -52,7 +52,7 @@ def elevation_map(
         mean: (X, Y, Z) float32 expected coverage.
         precision: (X, Y, Z) float32, 1/σ².
         grid: The voxels, Z > 1.
-        sigma_prior: Standard deviation of the coverage of a voxel that nobody has measured.
+        sigma_prior: Standard deviation of the coverage of a voxel that was never measured.
         sigma_min: Least standard deviation of a measured coverage (`RangeSensor.sigma_min`), the unit of
             `measurements`.
 
@@ -81,7 +81,7 @@ def _fill_ground(mean, precision, prior, unit, ground):
     Args:
         mean: (X, Y, Z) float32.
         precision: (X, Y, Z) float32.
-        prior: Precision of a voxel that nobody has measured, float32.
+        prior: Precision of a voxel that was never measured, float32.
         unit: Precision of one measurement.
         ground: (3, X, Y) float64, filled.
     """
@@ -283,7 +283,7 @@ def _copy(source, target):
 
 @lean_kernel
 def _sweep(board, factor, limit, together, moving):
-    """Relax every square so many times; `moving` counts those that a sweep changed by more than a limit."""
+    """Relax every square this many times; `moving` counts those that a sweep changed by more than a limit."""
     rows = len(board.white) - 2
     for sweep in range(together):
         moving[sweep] = 0

@@ -30,7 +30,7 @@ def landmark_score(belief, prior, voxel):
 
     Args:
         belief: Belief.
-        prior: Precision of a voxel that nobody has measured, float32.
+        prior: Precision of a voxel that was never measured, float32.
         voxel: Its number.
     """
     x, y, z = grid_index(belief.size, voxel)

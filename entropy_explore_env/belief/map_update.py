@@ -17,7 +17,7 @@ from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel,
 _NOTHING = int(Return.NOTHING)
 
 PRIOR_MEAN = 0.5
-"""Expected coverage of a voxel that nobody has measured: no preference."""
+"""Expected coverage of a voxel that was never measured: no preference."""
 
 _FOLD_BELOW = 1e-250
 """A product of precision ratios is folded into bits, by its logarithm, before it could leave a float64.

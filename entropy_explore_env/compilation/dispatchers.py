@@ -39,7 +39,7 @@ from entropy_explore_env.compilation.stamps import forget_parts, tree_size
 
 _WRAPPERS = {"no_cfunc_wrapper": True}
 _WORTH_DIVIDING = 10
-"""So many kernels are compiled by two processes; to look for what each of them does takes time as well."""
+"""From this number of kernels on two processes compile; finding what each of them does costs time, too."""
 _NO_WRAPPERS = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
 
 

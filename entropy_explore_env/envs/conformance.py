@@ -273,7 +273,7 @@ def check_conformance(
 
     Args:
         scenario: A scenario's name, or a Scenario.
-        steps: Episodes are cut off after so many; None = where the scenario ends them.
+        steps: Episodes are cut off after this many; None = where the scenario ends them.
         seed: Of mission 0; mission e of a batch takes seed + e.
         report: Is told each check that holds.
         **settings: As for `EntropyExploreEnv`.
@@ -300,7 +300,7 @@ def main(words: Sequence[str]) -> int:
     parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario")
     parser.add_argument("--world", help="a world file in place of the scenario's world")
     parser.add_argument("--robots", type=int, help="team size; default: the scenario's")
-    parser.add_argument("--steps", type=int, default=100, help="an episode is cut off after so many")
+    parser.add_argument("--steps", type=int, default=100, help="an episode is cut off after this many")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
     given = parser.parse_args(words)

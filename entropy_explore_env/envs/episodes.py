@@ -18,7 +18,7 @@ from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.world import World
 
 EPISODES = 2
-"""So many episodes in a row are compared: the one of a seed, and those that follow it."""
+"""Number of episodes in a row that are compared: the one of a seed, and those that follow it."""
 OTHER_ACTIONS = 1
 """The kind of actions that are not the episode's own."""
 PARTS = ("observations", "rewards", "terminations", "truncations", "infos")
@@ -50,7 +50,7 @@ class Task:
         return EntropyExploreEnv(self.scenario, **self._world)
 
     def vector_env(self, missions: int, **how: Any) -> EntropyExploreVectorEnv:  # noqa: ANN401 - as the class's
-        """Return a new environment for so many missions."""
+        """Return a new environment for this many missions."""
         return EntropyExploreVectorEnv(self.scenario, missions, **how, **self._world)
 
     @property
@@ -95,7 +95,7 @@ def walk(value: object, where: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def leaves(value: object, where: str = "") -> Leaves:
-    """Return what a value is made of, as something that nobody can change any more."""
+    """Return what a value is made of, as something that cannot be changed any more."""
     found: Leaves = {}
     for place, part in walk(value, where):
         kind = type(part).__name__

@@ -39,7 +39,7 @@ def robot_infos(missions: Missions, mission: int, texts: bool = True) -> list[di
     team has seen also `seen_share`, of all that can be seen. Where the scenario has faults
     also `stopped`, `blind` and `silent`: whether the robot fails so now. Where robots drift also
     `pose_error_m` and `pose_error_rad`: so far off was what the robot believed of its pose
-    when it last scanned or decided under way; nobody acts on it.
+    when it last scanned or decided under way; nothing acts on it.
 
     Args:
         missions: The missions.

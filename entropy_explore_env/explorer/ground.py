@@ -71,7 +71,7 @@ class Ground:
         return None if self._workspace is None else self._workspace.canvas
 
     def _begin(self, canvas: Canvas, known_bits: float, fixed: bool = False) -> None:
-        """Plan in another canvas, of which so many bits are known."""
+        """Plan in another canvas, of which this many bits are known."""
         task = self._task if fixed else dataclasses.replace(self._task, grid=canvas.grid)
         self._workspace, self.begun, self._fixed = Workspace(canvas, task), self.begun + 1, fixed
         self.entropy_bits = canvas.grid.voxels * self._voxel_bits - known_bits

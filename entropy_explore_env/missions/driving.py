@@ -281,7 +281,7 @@ def next_decision(params, robots):
 
 @lean_kernel
 def plan_scan(params, robot):
-    """Set when a robot scans next: after so many metres of its path, or where the drive ends."""
+    """Set when a robot scans next: after this many metres of its path, or where the drive ends."""
     robot.next_scan_s = robot.ready_s
     scan_m = (robot.scans_under_way + 1) * params.scan_every_m - robot.scan_lead_m
     if scan_m < robot.path_m * (1.0 - _ROUNDING):

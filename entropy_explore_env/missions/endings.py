@@ -13,13 +13,13 @@ _RUNNING, _MAPPED = MissionEnd.RUNNING.code, MissionEnd.MAPPED.code
 _SEEN, _STOPPED = MissionEnd.SEEN.code, MissionEnd.STOPPED.code
 _EXHAUSTED = MissionEnd.EXHAUSTED.code
 IDLE_SCANS, IDLE_ROUNDS = 100, 8.0
-"""A mission that ends by what was seen asks what is left when nothing new was seen for so many scans a robot,
+"""A mission that ends by what was seen asks what is left when this many scans a robot showed nothing new,
 and while the team drove so often along all edges of the workspace, a robot on average."""
 
 
 @lean_kernel
 def mission_end(mission):
-    """Code of a MissionEnd after an event: what the mission asks for, or that nobody is left for it."""
+    """Code of a MissionEnd after an event: what the mission asks for, or that no robot is left for it."""
     clock, team = mission.clock, mission.team
     if team.params[0].by_seen:
         end = _SEEN if seen_enough(mission) else _RUNNING

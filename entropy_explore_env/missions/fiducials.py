@@ -29,10 +29,10 @@ def fiducial_places(scenario: Scenario, world: World, seed: int, episode: int) -
     Drawn ones are on surfaces of voxels that robots can see: of a team that stays in planes, in these planes.
 
     Returns:
-        (F, 3) float64, metres, map frame; none where nobody drifts.
+        (F, 3) float64, metres, map frame; none where no robot drifts.
 
     Raises:
-        WorldError: One that is given is in something solid, or there are not so many surfaces.
+        WorldError: One that is given is in something solid, or there are fewer surfaces than that.
     """
     settings, grid = scenario.fiducials, world.grid
     none = np.zeros((0, 3))

@@ -56,7 +56,7 @@ def begin_estimates(seed: int, episode: int, poses: np.ndarray, estimates: np.nd
         seed: Of the mission.
         episode: See `Missions.draw_episode`.
         poses: (A, 5) float64.
-        estimates: (A,) ESTIMATE of zeros, filled in; empty where nobody drifts.
+        estimates: (A,) ESTIMATE of zeros, filled in; empty where no robot drifts.
     """
     if len(estimates):
         estimates["place"], estimates["yaw"], estimates["scan_pose"] = poses[:, :3], poses[:, 3], poses
@@ -102,7 +102,7 @@ def localization_figures(estimates: np.ndarray, scans: int) -> dict[str, float |
 
 @lean_kernel
 def localization_of(params, estimates, fiducials, landmarks, mission):
-    """TeamLocalization of a mission; None where nobody drifts.
+    """TeamLocalization of a mission; None where no robot drifts.
 
     Args:
         params: (A,) LOCALIZATION_PARAMS, or None.
@@ -118,7 +118,7 @@ def localization_of(params, estimates, fiducials, landmarks, mission):
 
 @lean_kernel
 def estimate_of(localization, index):
-    """ESTIMATE of a robot; None where nobody drifts.
+    """ESTIMATE of a robot; None where no robot drifts.
 
     Args:
         localization: TeamLocalization, or None.

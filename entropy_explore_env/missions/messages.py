@@ -225,7 +225,7 @@ def enqueue(clock, team, in_flight, index, count, recipients, delay_s):
         in_flight: InFlight.
         index: The sender's number.
         count: Measurements in it; -1 = an announcement.
-        recipients: (A,) bool, who will hear it.
+        recipients: (A,) bool, which robots will hear it.
         delay_s: How long it is under way.
     """
     slot = 0

@@ -104,8 +104,8 @@ MISSION = ranged_type(
             "explored_end",
             "i8",
             Values(0, MAX_VOXELS),
-        ),  # so many explored visible voxels end the mission, if so it ends,
-        ("explored_free_end", "i8", Values(-MAX_VOXELS, "voxels")),  # and so many free ones
+        ),  # this many explored visible voxels end the mission, if so it ends,
+        ("explored_free_end", "i8", Values(-MAX_VOXELS, "voxels")),  # and this many free ones
         # since a scan showed something new, or since it was asked what is left:
         ("idle_scans", "i8", COUNT),  # the team's scans
         ("idle_from_m", "f8", Values(-ROUNDING, MOST)),  # what the team had driven then

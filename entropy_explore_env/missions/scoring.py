@@ -1,6 +1,6 @@
 """How far a mission has come: times on the way, and the joint map against the truth.
 
-The joint map fuses every measurement that any robot takes, at once and without loss. Nobody acts on it;
+The joint map fuses every measurement that any robot takes, at once and without loss. Nothing acts on it;
 it is kept where the scenario tracks the truth. Its figures are updated ray by ray, never from all voxels.
 """
 
@@ -106,7 +106,7 @@ def score_scan(clock, joint, truth, scan, prior_precision):
         joint: JointMap, changed in place.
         truth: (V,) float32.
         scan: Scan with crossings and precisions filled in.
-        prior_precision: 1/σ² of a voxel that nobody has measured.
+        prior_precision: 1/σ² of a voxel that was never measured.
     """
     prior = np.float32(prior_precision)
     for index in range(len(scan.rays)):

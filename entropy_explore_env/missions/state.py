@@ -73,7 +73,7 @@ class MissionState(NamedTuple):
     in_flight: np.ndarray
     """(E, Q) MESSAGE: delayed messages that have not arrived."""
     in_flight_to: np.ndarray
-    """(E, Q, A) bool: who will hear them."""
+    """(E, Q, A) bool: which robots will hear them."""
     in_flight_rays: np.ndarray
     """(E, Q, B, 5) float64: direction (3), distance in grid units, Return."""
     phases: np.ndarray

@@ -57,7 +57,7 @@ def _check_values(name: str, numbers: np.ndarray, values: Values, bounds: Bounds
 
 
 def _bound(end: float | str, bounds: Bounds, axes: int) -> float | np.ndarray:
-    """Return a bound that can be compared with numbers of so many axes."""
+    """Return a bound that can be compared with numbers of this many axes."""
     if not isinstance(end, str):
         return end
     bound = bounds[end]

@@ -112,7 +112,7 @@ def note_summary(team, recipients, sender, pose, sent_s, time_s, bits):
 
     Args:
         team: Team.
-        recipients: (A,) bool, whom it reaches; in place, who takes it in.
+        recipients: (A,) bool, which robots it reaches; in place, which take it in.
         sender: Its number.
         pose: (x, y, z, yaw, pitch), where the sender believed to be.
         sent_s: When.
@@ -211,7 +211,7 @@ def hear_summary(tree, team, maps, recipients, length, most):
         tree: Tree, the summary in its data.
         team: Team.
         maps: Maps.
-        recipients: (A,) bool, who hears it.
+        recipients: (A,) bool, which robots hear it.
         length: Bytes of the summary.
         most: Most precision that a leaf has.
     """

@@ -193,7 +193,7 @@ def _arranged(
 
 
 def _panel_boxes(panel: Box, named: int, lines: int, unit: int) -> tuple[Box, Box, Box]:
-    """Status, legend of so many lines and the axes of the curves within the side panel."""
+    """Status, legend of this many lines and the axes of the curves within the side panel."""
     narrow = panel.width < 1.6 * panel.height
     column = panel.width if narrow else _SIDE * unit
     status = Box(panel.left, panel.top, column, lines * LINE_HEIGHT * unit)

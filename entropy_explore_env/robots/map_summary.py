@@ -76,7 +76,7 @@ class MapSummary(NamedTuple):
 
 
 def summary_bytes(voxels: int) -> int:
-    """Return the bytes that no summary of a map of so many voxels exceeds.
+    """Return the bytes that no summary of a map of this many voxels exceeds.
 
     Where all decisions count as equally likely, fewer than two nodes a voxel are told by three decisions each
     at most, and each of them that is a leaf by 25 more: 31 bits a voxel. A 256th more is what rounding costs.
@@ -85,7 +85,7 @@ def summary_bytes(voxels: int) -> int:
 
 
 def new_summary_tree(voxels: int) -> Tree:
-    """Working space for writing and reading summaries of maps of so many voxels."""
+    """Working space for writing and reading summaries of maps of this many voxels."""
     return new_tree(np.zeros(summary_bytes(voxels), np.uint8), voxels)
 
 

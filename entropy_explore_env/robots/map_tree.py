@@ -2,8 +2,8 @@
 
 A region in which every voxel was measured becomes one leaf if the information content of the histogram of its
 coverages (Sujan, eqs. 1-2) is not above a threshold; else it is cut in two along each axis: quadrants in
-plans, octants in 3-D. A region that nobody measured is left out. A leaf says one mean and one σ for all its
-voxels, never a smaller σ than the map has in any of them. Nodes come depth first.
+plans, octants in 3-D. A region that was never measured is left out. A leaf says one mean and one σ for all
+its voxels, never a smaller σ than the map has in any of them. Nodes come depth first.
 """
 
 from __future__ import annotations

@@ -85,7 +85,7 @@ def in_field_of_view(params, yaw, pitch, away):
 
 @lean_kernel
 def within_half_view(params, turn, tilt):
-    """Return whether a direction so many radians beside and below the gaze is in the field of view.
+    """Return whether a direction this many radians beside and below the gaze is in the field of view.
 
     Args:
         params: LOCALIZATION_PARAMS of the robot.

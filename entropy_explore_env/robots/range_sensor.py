@@ -150,7 +150,7 @@ def sensor_of(sensors, robot):
 
 @inlined_kernel
 def first_rays(scan, count):
-    """Return the working space of a scan of so many rays."""
+    """Return the working space of a scan of this many rays."""
     return Scan(
         scan.rays[:count],
         scan.utility[:count],

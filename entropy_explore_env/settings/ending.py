@@ -21,7 +21,7 @@ BITS_OF_UNIT_GAUSSIAN = 0.5 * math.log2(2.0 * math.pi * math.e)
 
 
 SIGMA_PRIOR = 30.0
-"""Standard deviation of the coverage of a voxel that nobody has measured (Rocha04, table 2)."""
+"""Standard deviation of the coverage of a voxel that was never measured (Rocha04, table 2)."""
 
 
 def gaussian_entropy_bits(sigma: float) -> float:
@@ -41,7 +41,7 @@ class Ending:
     are those voxels of `World.visible`, the free ones that are connected with where robots can be and the
     solid ones beside them, that are in line of sight and range of a place that a body of the team can reach
     from its start: behind a gap too narrow for bodies only what beams through it reach
-    (`worlds.sight.visible_from`). Nobody acts on it: the mission keeps the joint map for it
+    (`worlds.sight.visible_from`). Nothing acts on it: the mission keeps the joint map for it
     (`Scenario.track_truth`). Such a mission is cut off (`MissionEnd.EXHAUSTED`) when every robot's own map
     holds all of it that robots can drive up to, and the team has long driven without seeing anything new:
     the rest lies behind such gaps (`missions.endings.exhausted`). By entropy a mission needs no such end, as
@@ -75,7 +75,7 @@ class Ending:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        allowed = f"a number from 1e-4 to below {SIGMA_PRIOR:g}, the σ of what nobody has measured"
+        allowed = f"a number from 1e-4 to below {SIGMA_PRIOR:g}, the σ of what was never measured"
         check(self, "sigma_end", allowed, lambda v: 1e-4 <= v < SIGMA_PRIOR)
         check_choice(self, "termination", Literal["any", "all", "shared"])
         if self.seen_share is not None:

@@ -32,7 +32,7 @@ class Robot:
         max_speed_m_s: Top speed, 1e-4 to 1e4.
         acceleration_m_s2: Acceleration and deceleration, 1e-4 to 1e6.
         turn_rate_rad_s: Rate of yaw and pitch, while driving, 1e-4 to 1e6; inf = at once.
-        body_radius_m: The body is a ball; 0 = a point that blocks nobody. At most 1e6.
+        body_radius_m: The body is a ball; 0 = a point that blocks no robot. At most 1e6.
         sensor_height_m: Planar robots: height of the sensor above the workspace's floor, 0 to 1e6.
         tilts: Planar robots: whether the sensor also looks up and down, as a camera on a mast; not in 2-D.
         above_ground_m: Planar robots: the sensor's height above the ground that must carry the robot, 1e-6 to

@@ -272,7 +272,7 @@ class World:
 
 
 def _kept(array: np.ndarray) -> np.ndarray:
-    """Return the array itself if nobody can write through it, else a read-only copy."""
+    """Return the array itself if nothing can write through it, else a read-only copy."""
     if array.flags.writeable:
         array = array.copy()
         array.setflags(write=False)

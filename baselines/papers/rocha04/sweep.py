@@ -42,7 +42,7 @@ CHANGES: dict[str, tuple[str, dict[str, Any], str]] = {
 
 
 def team_id(robots: int, burst: int, i_min_bits: float) -> str:
-    """Name of the cell with this team; one robot shares with nobody, whatever the channel."""
+    """Name of the cell with this team; a robot alone shares nothing, whatever the channel."""
     return "single" if robots == 1 else f"team-{robots}-burst-{burst}-imin-{i_min_bits}"
 
 

@@ -53,7 +53,7 @@ class Change:
         settings: Of the scenario.
         coordination: Fields of MutualInformationConfig.
         both: Whether it concerns the uncoordinated method, too; else it is compared with that as it is.
-        starts: At most so many, where missions seldom end.
+        starts: At most this many, where missions seldom end.
     """
 
     text: str
@@ -69,7 +69,9 @@ def _changed(**robot: Any) -> dict[str, Any]:  # noqa: ANN401
 
 CHANGES: dict[str, Change] = {
     "bodies": Change(
-        "bodies off: nobody blocks or hides anybody", _changed(body_radius_m=0.0), {"teammates_block": False}
+        "bodies off: no robot is in the way",
+        _changed(body_radius_m=0.0),
+        {"teammates_block": False},
     ),
     "bodies-no-overlap": Change(
         "bodies off, and λ = 1",
@@ -106,7 +108,7 @@ CHANGES: dict[str, Change] = {
 
 
 def cell_id(robots: int, method: str, blocked: str = "wait") -> str:
-    """Name of a cell of the main experiment; one robot is blocked by nobody and coordinated with nobody."""
+    """Name of a cell of the main experiment; a robot alone is not blocked and not coordinated."""
     if robots == 1:
         return "n1-random" if method == "random" else "n1-rule"
     return f"n{robots}-{method}-{blocked}"

@@ -193,7 +193,7 @@ def action_count(scenario: Scenario, rules: Rules) -> int:
 
 
 def _most_utility_bits(scenario: Scenario, rules: Rules) -> float:
-    """More than any ray can bring: the longest one, over voxels that nobody has measured."""
+    """More than any ray can bring: the longest one, over voxels that was never measured."""
     most, prior = 0.0, float(rules.params[0]["prior_precision"])
     for kind in scenario.kinds:
         length = kind.sensor.max_range_m / scenario.grid.voxel_size_m

@@ -36,7 +36,7 @@ _SHARE = 2.0
 """Triangles are cut into four until no edge is longer than a voxel divided by this; the surface's voxels are
 those that a corner of these small triangles lies in."""
 _LONG_HALVINGS, _THIN = 7, 4.0
-"""A triangle is long and thin if it would be cut into four more often than this, and that would make so many
+"""A triangle is long and thin if it would be cut into four more often than this, and that would make too many
 times as many small ones as would cover it: it is covered by lines instead, no further from each other."""
 _HALVINGS_AT_ONCE = 8
 _POINTS_AT_ONCE = 1 << 18

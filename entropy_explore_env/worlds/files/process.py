@@ -77,7 +77,7 @@ USUAL = Limits()
 
 
 def _memory_bytes(limits: Limits, form: Format, size: int) -> int:
-    """Return the memory limit for a file of so many bytes."""
+    """Return the memory limit for a file of this many bytes."""
     mib: Any = limits.memory_mib
     if mib is None:
         mib = os.environ.get(READ_MEMORY_VARIABLE)
