@@ -81,7 +81,7 @@ def written_extras() -> dict[str, set[str]]:
 
 def test_the_extras_are_those_of_the_project_but_for_its_developers():
     written, found = written_extras(), doctor.findings()["extras"]
-    assert {*written} - {*found} == {"test", "dev"} and len(found) == 11
+    assert {*written} - {*found} == {"test", "dev"} and len(found) == 12
     for extra, packages in found.items():
         if sys.version_info >= (3, 11) or extra not in ("viewer", "docs"):
             assert written[extra] <= set(packages), extra

@@ -19,8 +19,10 @@ LARGE = ("benchmarl", "ray", "stable_baselines3", "torch", "torchrl")
 """What only some extras bring."""
 
 
-TESTED_THERE = tuple(path for path in shown_files() if "training" in path.parts)
-"""Files that tests/training/test_examples.py runs."""
+TESTED_THERE = tuple(
+    path for path in shown_files() if "training" in path.parts or path.name.startswith("test_")
+)
+"""Files that tests/training/test_examples.py or pytest itself runs."""
 BLOCKS = [block for block in blocks() if ROOT / block.name not in TESTED_THERE]
 
 

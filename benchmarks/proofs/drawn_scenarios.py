@@ -144,6 +144,7 @@ FIELDS: Mapping[type, Mapping[str, Numbers | Sequence[Any]]] = MappingProxyType(
             "termination": ("any", "all", "shared"),
             "seen_share": Numbers(1e-9, 1.0, 0.2, 1.0, also=(None,)),
             "unseen_free_voxels": _count(0, 2**31 - 1, 0, 500, None),
+            "return_to_start": _SWITCH,
             "time_limit_s": Numbers(1e-3, 1e9, 1.0, 1e4, also=(math.inf,)),
             "max_cycles": _count(1, 2**62, 1, 100, None),
         },

@@ -119,7 +119,7 @@ def _bounds(scenario: Scenario, arrays: Arrays) -> dict[str, float | np.ndarray]
     high, far = low + scenario.grid.size_m, off_m / scenario.grid.voxel_size_m
     corners = {
         "": (low, high),
-        "zero_": (np.minimum(low, 0.0), np.maximum(high, 0.0)),
+        "zero_": (np.minimum(low, 0.0) - ROUNDING, np.maximum(high, 0.0) + ROUNDING),
         "far_": (np.minimum(low - off_m, 0.0), np.maximum(high + off_m, 0.0)),
         "grid_": (np.zeros(3) - ROUNDING, shape + ROUNDING),
         "far_grid_": (np.zeros(3) - far, shape + far),

@@ -121,6 +121,7 @@ REFUSED = {
     (Ending, "termination"): KIND,
     (Ending, "seen_share"): ("1", True, [1.0], NAN, 0.0, -0.5, 1.0001, INF),
     (Ending, "unseen_free_voxels"): ("1", True, [1], NAN, -1, 1.5, 2**31),
+    (Ending, "return_to_start"): SWITCH,
     (Ending, "time_limit_s"): (*POSITIVE, TINY, 0.9e-3, 1.1e9, HUGE),
     (Ending, "max_cycles"): ("1", True, [1], NAN, 0, -1, 1.5, 2**63),
     (Reward, "kind"): KIND,

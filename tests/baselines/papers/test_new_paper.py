@@ -143,7 +143,7 @@ def test_the_command_shows_a_table_and_can_be_strict(new_paper, tmp_path, capsys
         (["rocha04", "--frobnicate"], "--frobnicate"),
         (["bhattacharya", "--worlds", "nowhere.bt"], "worlds = 'nowhere.bt'"),
         (["bhattacharya", "--worlds", "pyproject.toml", "README.md"], "an OctoMap of one corridor"),
-        (["sawhney", "--seeds", "1"], "seeds = 1: allowed is a whole number ≥ 2"),
+        (["sawhney", "--seeds", "1"], "seeds = 1: expected a whole number ≥ 2"),
         (["sawhney", "--worlds", "pyproject.toml", "./pyproject.toml"], "files of different names"),
     ],
 )
