@@ -78,9 +78,9 @@ class Trail:
     """Decisions for which it still backs off."""
     stood_at: np.ndarray = field(default_factory=lambda: np.full(3, np.inf))
     stands: int = 0
+    """Number of decisions in a row near `stood_at`."""
     home: np.ndarray = field(default_factory=lambda: np.full(5, np.nan))
     """(5,) where it was when it decided first."""
-    """Number of decisions in a row near `stood_at`."""
 
 
 class Driver(ABC):

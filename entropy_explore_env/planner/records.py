@@ -124,33 +124,18 @@ EXPERIENCE = ranged_type(
         ("looked_far", "?", FLAG),  # whether they ever were, with this exponent
         ("far_at", "f8", GRID_PLACE, (3,)),  # where the robot was then
         ("patience", "i8", SIGNED),  # decisions until far places are evaluated again on the same spot
-        (
-            "stood_at",
-            "f8",
-            GRID_PLACE,
-            (3,),
-        ),  # where it stopped last, but for steps of less than a voxel edge
-        (
-            "low_gain_scans",
-            "i8",
-            COUNT,
-        ),  # in a row, taken there; once they are DEPLETED_SCANS, taken anywhere
+        # where it stopped last, but for steps of less than a voxel edge
+        ("stood_at", "f8", GRID_PLACE, (3,)),
+        # in a row, taken there; once they are DEPLETED_SCANS, taken anywhere
+        ("low_gain_scans", "i8", COUNT),
         ("blocked", "i8", COUNT),  # decisions during which it keeps clear of teammates
         ("edges", "i8", COUNT),  # drives that the end of the ground cut short
-        (
-            "edge_at",
-            "f8",
-            FAR_GRID_PLACE,
-            (REMEMBERED_EDGES, 3),
-        ),  # places just beyond it, the last of these drives
+        # places just beyond it, the last of these drives
+        ("edge_at", "f8", FAR_GRID_PLACE, (REMEMBERED_EDGES, 3)),
         ("failures", "i8", COUNT),  # number of viewpoints that failed, of which the last are kept
         ("failed", "f8", FAR_GRID_POSE, (REMEMBERED, 5)),  # viewpoints that did not bring what was expected
-        (
-            "share",
-            "f8",
-            Values(0.0, 1.0),
-            (REMEMBERED,),
-        ),  # of the expected bits that came; 0 = not reached, 1 = forgotten
+        # of the expected bits that came; 0 = not reached, 1 = forgotten
+        ("share", "f8", Values(0.0, 1.0), (REMEMBERED,)),
         ("forget_at", "f8", POSITIVE, (REMEMBERED,)),  # distance from it at which it is forgotten
     ],
 )
