@@ -21,7 +21,7 @@ from entropy_explore_env.explorer.goals import Decider, Goal, NoGoal, Why
 from entropy_explore_env.explorer.ground import Ground, Patch, boxes_around, nominal_grid
 from entropy_explore_env.explorer.occupancy import UNKNOWN_BETWEEN, Values, checked_origin, occupancy_of
 from entropy_explore_env.explorer.planned_rate import PlannedRate
-from entropy_explore_env.explorer.poses import checked_pose, poses_by_number, turned_by
+from entropy_explore_env.explorer.poses import checked_pose, poses_by_number
 from entropy_explore_env.explorer.team import Seat, view_of_seat
 from entropy_explore_env.explorer.workspace import Outlook, Workspace
 from entropy_explore_env.interop.messages import grid_of_message
@@ -29,6 +29,7 @@ from entropy_explore_env.missions.records import HEARD
 from entropy_explore_env.planner.weights import PlannerWeights, shipped_weights
 from entropy_explore_env.randomness import Stream, check_seed, generator
 from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.robots.rotations import turned_by
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.ending import Ending
 from entropy_explore_env.settings.robot import Robot

@@ -14,8 +14,9 @@ import numpy as np
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.explorer.explorer import Explorer
 from entropy_explore_env.explorer.goals import Goal
-from entropy_explore_env.interop.messages import pose_of, quaternion_of
+from entropy_explore_env.interop.messages import pose_of
 from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.robots.rotations import quaternion_of
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.sensor import RangeSensor
 

@@ -1,8 +1,7 @@
-"""Poses from outside, checked, and poses in a frame that is turned against the map's."""
+"""Poses from outside, checked."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -45,16 +44,3 @@ def poses_by_number(poses: object, robots: int) -> dict[int, np.ndarray]:
     if rows.shape != (robots, 5):
         raise SettingError("poses", poses, f"({robots}, 5) numbers, or a mapping from robots to five")
     return {number: checked_pose(f"poses[{number}]", row) for number, row in enumerate(rows)}
-
-
-def turned_by(poses: np.ndarray, yaw_rad: float) -> np.ndarray:
-    """Return places (..., 3), or poses (..., 5), turned by `yaw_rad` about the origin of the map frame."""
-    turned = np.array(poses, np.float64)
-    if yaw_rad == 0.0:
-        return turned
-    along, across = math.cos(yaw_rad), math.sin(yaw_rad)
-    turned[..., 0] = along * poses[..., 0] - across * poses[..., 1]
-    turned[..., 1] = across * poses[..., 0] + along * poses[..., 1]
-    if turned.shape[-1] == 5:
-        turned[..., 3] = (poses[..., 3] + yaw_rad + math.pi) % (2.0 * math.pi) - math.pi
-    return turned

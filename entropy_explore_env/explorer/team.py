@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from entropy_explore_env.belief.measurement_model import Return
-from entropy_explore_env.explorer.poses import turned_by
 from entropy_explore_env.explorer.workspace import Fused, Workspace
 from entropy_explore_env.missions.view import RobotView, read_only
 from entropy_explore_env.robots.knowledge import ScanView, TeammateView
 from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.robots.rotations import turned_by
 
 
 @dataclass

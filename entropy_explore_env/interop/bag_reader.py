@@ -18,7 +18,7 @@ import numpy as np
 from entropy_explore_env.belief.belief_map import FREE, UNKNOWN
 from entropy_explore_env.errors import RecordError, SettingError, WorldError, one_of
 from entropy_explore_env.interop.bag_writer import typestore
-from entropy_explore_env.interop.messages import grid_of_message
+from entropy_explore_env.interop.messages import grid_of_message, matrix_of, pose_of_matrix
 from entropy_explore_env.interop.octree import voxels_of_tree
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.validation import checked_path
@@ -67,15 +67,7 @@ class Frames:
 
     def hear(self, parent: str, child: str, position: Any, orientation: Any) -> None:  # noqa: ANN401
         """Take a transform."""
-        matrix = np.eye(4)
-        x, y, z, w = (float(getattr(orientation, axis)) for axis in "xyzw")
-        matrix[:3, :3] = [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-        matrix[:3, 3] = float(position.x), float(position.y), float(position.z)
-        self.links[child.lstrip("/")] = parent.lstrip("/"), matrix
+        self.links[child.lstrip("/")] = parent.lstrip("/"), matrix_of(position, orientation)
 
     def to(self, above: str, frame: str) -> np.ndarray | None:
         """Return the matrix (4, 4) from a frame to one above it; None = no links lead there."""
@@ -88,13 +80,6 @@ class Frames:
             at, link = self.links[at]
             matrix = link @ matrix
         return None
-
-
-def pose_of_matrix(matrix: np.ndarray) -> np.ndarray:
-    """Return the pose (5,) of a frame, from its matrix (4, 4) to the map frame; roll is left out."""
-    yaw = float(np.arctan2(matrix[1, 0], matrix[0, 0]))
-    pitch = float(np.arcsin(np.clip(-matrix[2, 0], -1.0, 1.0)))
-    return np.array([*matrix[:3, 3], yaw, pitch])
 
 
 def points_of_cloud(message: Any) -> np.ndarray:  # noqa: ANN401 - a PointCloud2

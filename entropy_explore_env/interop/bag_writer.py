@@ -20,13 +20,13 @@ from entropy_explore_env.belief.belief_map import FREE, SOLID, Map
 from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.interop.map_files import octomap_of
-from entropy_explore_env.interop.messages import quaternion_of
 from entropy_explore_env.interop.team_maps import joint_map
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.colours import robot_colour
 from entropy_explore_env.reports.recording import poses_now
 from entropy_explore_env.robots.range_sensor import sensor_model
+from entropy_explore_env.robots.rotations import gaze_matrix, quaternion_of, ray_directions
 
 LAYOUT = "foxglove_layout.json"
 """The layout for Foxglove that lies beside each bag."""
@@ -230,9 +230,11 @@ class BagWriter:
         """Write the hits of a robot's latest scan as points in its frame: x along the gaze."""
         state, sensor = self._missions.state, self._missions.scenario.kind_of(robot).sensor
         model, pose = sensor_model(sensor), state.robots[0, robot]["scan_pose"]
+        yaw, pitch = float(pose[3]), float(pose[4])
         hit = state.scan_returned[0, robot, : sensor.rays] == int(Return.HIT)
         ranges_m = state.scan_range_m[0, robot, : sensor.rays][hit]
-        rays = ray_directions(model.yaw_offsets, model.pitch_offsets, pose)[hit] @ rotation_of(pose)
+        rays = ray_directions(model.yaw_offsets, model.pitch_offsets, yaw, pitch)[hit]
+        rays = rays @ gaze_matrix(yaw, pitch)
         points = (rays * ranges_m[:, None]).astype("<f4")
         fields = [
             self._make("sensor_msgs/msg/PointField", name=axis, offset=4 * number, datatype=7, count=1)
@@ -283,19 +285,3 @@ class BagWriter:
         )
         rows = np.ascontiguousarray(percent.T).ravel()
         self._write("/map", "nav_msgs/msg/OccupancyGrid", time_s, header=header, info=about, data=rows)
-
-
-def ray_directions(yaws: np.ndarray, pitches: np.ndarray, pose: np.ndarray) -> np.ndarray:
-    """Return the unit vectors (R, 3) of a sensor's rays in the map frame, column by column."""
-    yaw, pitch = np.repeat(pose[3] + yaws, len(pitches)), np.tile(pose[4] + pitches, len(yaws))
-    return np.stack([np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), -np.sin(pitch)], axis=-1)
-
-
-def rotation_of(pose: np.ndarray) -> np.ndarray:
-    """Return the matrix (3, 3) that turns vectors of a pose's frame into the map frame."""
-    yaw, pitch = float(pose[3]), float(pose[4])
-    about_z = np.array([[math.cos(yaw), -math.sin(yaw), 0.0], [math.sin(yaw), math.cos(yaw), 0.0], [0, 0, 1]])
-    about_y = np.array(
-        [[math.cos(pitch), 0.0, math.sin(pitch)], [0, 1, 0], [-math.sin(pitch), 0.0, math.cos(pitch)]]
-    )
-    return np.asarray(about_z @ about_y)

@@ -21,6 +21,7 @@ from PIL import Image
 
 from entropy_explore_env.belief.belief_map import FREE, SOLID, UNKNOWN, Map
 from entropy_explore_env.errors import MissingExtraError, SettingError, WorldError, one_of
+from entropy_explore_env.robots.rotations import turned_by
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.validation import check_instance, checked_path, is_number
 from entropy_explore_env.worlds.files.archives import arrays, saved
@@ -132,9 +133,7 @@ def octomap_of(belief: Map, full: bool) -> bytes:
 def solid_points(belief: Map) -> np.ndarray:
     """Return the centres (N, 3) of solid voxels in the map frame, metres."""
     offsets = (np.argwhere(belief.labels() == SOLID) + 0.5) * belief.grid.voxel_size_m
-    along, across = math.cos(belief.yaw_rad), math.sin(belief.yaw_rad)
-    x, y = along * offsets[:, 0] - across * offsets[:, 1], across * offsets[:, 0] + along * offsets[:, 1]
-    return np.asarray(belief.grid.origin_m) + np.column_stack([x, y, offsets[:, 2]])
+    return np.asarray(belief.grid.origin_m) + turned_by(offsets, belief.yaw_rad)
 
 
 def _ply_of(belief: Map) -> bytes:

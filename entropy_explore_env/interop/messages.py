@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.robots.rotations import gaze_of, quaternion_matrix
 
 _LEVEL = 1e-3
 """Largest x and y of the quaternion of a map that lies level."""
@@ -53,18 +54,17 @@ def grid_of_message(message: Any) -> GridMessage:  # noqa: ANN401 - any class wi
 
 def pose_of(position: Any, orientation: Any) -> np.ndarray:  # noqa: ANN401
     """Return the pose (5,) of a position and a quaternion; roll is left out."""
-    x, y, z, w = (float(getattr(orientation, axis)) for axis in "xyzw")
-    yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-    pitch = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
-    return np.array([float(position.x), float(position.y), float(position.z), yaw, pitch])
+    return pose_of_matrix(matrix_of(position, orientation))
 
 
-def quaternion_of(yaw: float, pitch: float = 0.0) -> tuple[float, float, float, float]:
-    """Return the quaternion (x, y, z, w) of a yaw and a pitch, which is downwards (REP-103)."""
-    half_yaw, half_pitch = 0.5 * yaw, 0.5 * pitch
-    return (
-        -math.sin(half_yaw) * math.sin(half_pitch),
-        math.cos(half_yaw) * math.sin(half_pitch),
-        math.sin(half_yaw) * math.cos(half_pitch),
-        math.cos(half_yaw) * math.cos(half_pitch),
-    )
+def matrix_of(position: Any, orientation: Any) -> np.ndarray:  # noqa: ANN401
+    """Return the matrix (4, 4) from a frame to its parent, in which it has a position and a quaternion."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = quaternion_matrix(*(float(getattr(orientation, axis)) for axis in "xyzw"))
+    matrix[:3, 3] = float(position.x), float(position.y), float(position.z)
+    return matrix
+
+
+def pose_of_matrix(matrix: np.ndarray) -> np.ndarray:
+    """Return the pose (5,) of a frame, from its matrix (4, 4) to the map frame; roll is left out."""
+    return np.array([*matrix[:3, 3], *gaze_of(matrix)])

@@ -12,6 +12,7 @@ from entropy_explore_env.compilation.kernels import record_type
 from entropy_explore_env.robots.faults import FAULT_PARAMS
 from entropy_explore_env.robots.localization import LOCALIZATION_PARAMS
 from entropy_explore_env.robots.range_sensor import TeamSensors, team_sensors
+from entropy_explore_env.robots.rotations import directions_of
 from entropy_explore_env.settings.observation import Observation
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.scenario import Scenario
@@ -300,6 +301,4 @@ def panorama_directions(scenario: Scenario) -> np.ndarray:
         return np.zeros((0, 3))
     yaws = settings.panorama_yaws or (32 if scenario.grid.flat else 16)
     gazes = gaze_set(yaws, 1 if scenario.planar else settings.panorama_pitches)
-    yaw, pitch = gazes[:, 0], gazes[:, 1]
-    directions = [np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), -np.sin(pitch)]
-    return np.ascontiguousarray(np.stack(directions, axis=-1))
+    return directions_of(gazes[:, 0], gazes[:, 1])

@@ -25,6 +25,7 @@ from entropy_explore_env.reports.projection import KNOWN_BELOW
 from entropy_explore_env.reports.recording import DrivenPaths, poses_now
 from entropy_explore_env.robots.channel import select_measurements
 from entropy_explore_env.robots.range_sensor import Return, sensor_model
+from entropy_explore_env.robots.rotations import directions_of, quaternion_of, ray_directions
 from entropy_explore_env.settings.sensor import RangeSensor
 
 TIMELINE = "simulated"
@@ -111,7 +112,7 @@ class RerunView:
         robots = missions.state.robots[0]
         self._driven.update(missions)
         for robot, (x, y, z, yaw, pitch) in enumerate(poses.tolist()):
-            quaternion = rr.Quaternion(xyzw=_quaternion(yaw, pitch))
+            quaternion = rr.Quaternion(xyzw=quaternion_of(yaw, pitch))
             pose = rr.Transform3D(translation=(x, y, z), quaternion=quaternion)
             self._stream.log(f"world/robots/robot_{robot}", pose)
             for position_m in [*self._driven.passed_m[robot][self._passed[robot] :], poses[robot, :3]]:
@@ -244,7 +245,7 @@ def cone_edges(sensor: RangeSensor, yaw: float, pitch: float) -> list[np.ndarray
     """Polylines (N, 3) around the field of view of a sensor at (0, 0, 0), 1 m away: outline and edges."""
     model = sensor_model(sensor)
     yaws = np.linspace(model.yaw_offsets[0], model.yaw_offsets[-1], 17) + yaw
-    low, high = (np.stack(_gazes(yaws, pitch + model.pitch_offsets[end]), axis=-1) for end in (-1, 0))
+    low, high = (directions_of(yaws, pitch + model.pitch_offsets[end]) for end in (-1, 0))
     sides = [np.stack([arc[0], np.zeros(3), arc[-1]]) for arc in (low, high)]
     return [low, *sides[:1]] if len(model.pitch_offsets) == 1 else [low, high, *sides]
 
@@ -259,22 +260,9 @@ def shared_ends_m(missions: Missions, robot: int) -> np.ndarray:
     order = np.zeros(len(utility), np.int64)
     burst = min(scenario.channel.burst, sensor.rays)
     chosen = order[: select_measurements(utility, burst, float(own["i_min_bits"]), order)]
-    yaws = np.repeat(own["scan_pose"][3] + model.yaw_offsets, len(model.pitch_offsets))
-    pitches = np.tile(own["scan_pose"][4] + model.pitch_offsets, len(model.yaw_offsets))
-    rays = np.stack(_gazes(yaws, pitches), axis=-1) * state.scan_range_m[0, robot, : sensor.rays][:, None]
+    directions = ray_directions(model.yaw_offsets, model.pitch_offsets, *own["scan_pose"][3:])
+    rays = directions * state.scan_range_m[0, robot, : sensor.rays][:, None]
     return own["scan_pose"][:3] + rays[chosen]
-
-
-def _gazes(yaw: Any, pitch: Any) -> tuple[np.ndarray, ...]:  # noqa: ANN401 - numbers or arrays
-    """Return unit vectors along gazes; pitch downwards (REP-103)."""
-    return np.broadcast_arrays(np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), -np.sin(pitch))
-
-
-def _quaternion(yaw: float, pitch: float) -> tuple[float, float, float, float]:
-    """Quaternion (x, y, z, w) of a gaze: pitch about y, then yaw about z."""
-    sin_yaw, cos_yaw = math.sin(0.5 * yaw), math.cos(0.5 * yaw)
-    sin_pitch, cos_pitch = math.sin(0.5 * pitch), math.cos(0.5 * pitch)
-    return -sin_yaw * sin_pitch, cos_yaw * sin_pitch, sin_yaw * cos_pitch, cos_yaw * cos_pitch
 
 
 def _blueprint() -> Any:  # noqa: ANN401 - Rerun's

@@ -18,8 +18,8 @@ from entropy_explore_env.explorer.explorer import Explorer
 from entropy_explore_env.explorer.goals import NoGoal, Why
 from entropy_explore_env.explorer.occupancy import occupancy_of
 from entropy_explore_env.explorer.planned_rate import PlannedRate
-from entropy_explore_env.explorer.poses import turned_by
 from entropy_explore_env.planner.weights import shipped_weights
+from entropy_explore_env.robots.rotations import turned_by
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import find_scenario
 from tests.explorer.hand_drawn import EDGE_M, START, look, plan_by_hand

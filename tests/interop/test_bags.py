@@ -17,18 +17,12 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import RecordError, SettingError, WorldError
 from entropy_explore_env.explorer.explorer import Explorer
 from entropy_explore_env.explorer.planned_rate import PlannedRate
-from entropy_explore_env.interop.bag_reader import (
-    BagReader,
-    Frames,
-    MapHeard,
-    ScanHeard,
-    pose_of_matrix,
-    world_of_bag,
-)
+from entropy_explore_env.interop.bag_reader import BagReader, Frames, MapHeard, ScanHeard, world_of_bag
 from entropy_explore_env.interop.bag_writer import BagWriter, typestore
 from entropy_explore_env.interop.map_files import octomap_of
-from entropy_explore_env.interop.messages import grid_of_message, pose_of, quaternion_of
+from entropy_explore_env.interop.messages import grid_of_message, pose_of, pose_of_matrix
 from entropy_explore_env.interop.octree import voxels_of_tree
+from entropy_explore_env.robots.rotations import quaternion_of
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import find_scenario
