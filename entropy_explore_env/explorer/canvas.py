@@ -10,6 +10,7 @@ import numpy as np
 
 from entropy_explore_env.belief.map_update import PRIOR_MEAN
 from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.worlds.world import box_around
 
 _ON_LATTICE = 0.01
 """Two grids share a lattice whose corners differ from whole voxels by no more than this, in voxel edges."""
@@ -54,13 +55,11 @@ class Canvas:
 
 def box_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Return the first voxel (3,) int64 of a mask's box, and the one past its last; None = it is empty."""
-    low, high = np.zeros(3, np.int64), np.zeros(3, np.int64)
-    for axis in range(3):
-        filled = np.flatnonzero(mask.any(axis=tuple(other for other in range(3) if other != axis)))
-        if len(filled) == 0:
-            return None
-        low[axis], high[axis] = filled[0], filled[-1] + 1
-    return low, high
+    if not mask.any():
+        return None
+    box = box_around(mask)
+    low, high = [part.start for part in box], [part.stop for part in box]
+    return np.array(low, np.int64), np.array(high, np.int64)
 
 
 def grid_of(shape: np.ndarray, voxel_size_m: float, origin_m: np.ndarray) -> Grid:

@@ -8,8 +8,8 @@ import numpy as np
 
 from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.explorer.workspace import Fused, Workspace
-from entropy_explore_env.missions.view import RobotView, read_only
-from entropy_explore_env.robots.knowledge import ScanView, TeammateView
+from entropy_explore_env.missions.view import RobotView, read_only, teammate_view
+from entropy_explore_env.robots.knowledge import ScanView
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.rotations import turned_by
 
@@ -104,26 +104,15 @@ def view_of_seat(
         depth_m=seat.depth_m,
         half_angle_rad=seat.half_angle_rad,
         scan=ScanView(scan_pose.copy(), seat.ranges_m, seat.returned, seat.bits),
-        teammates={mate: _teammate(told[mate], seats[mate]) for mate in range(len(seats)) if mate != robot},
+        teammates={
+            mate: teammate_view(told[mate], not other.here and bool(told[mate]["heard_s"] >= 0.0))
+            for mate, other in enumerate(seats)
+            if mate != robot
+        },
         heard=read_only(told),
         gained_bits=seat.gained_bits,
         heard_bits=seat.heard_bits,
         candidates=np.zeros((0, 5)),
         ceiling=None,
         rules=workspace.rules,
-    )
-
-
-def _teammate(heard: np.void, seat: Seat) -> TeammateView:
-    """Return what is known of a teammate; one whose pose is not given is silent."""
-    silent = not seat.here and bool(heard["heard_s"] >= 0.0)
-    announced = np.zeros(7) if silent else heard["announced"].copy()
-    return TeammateView(
-        heard_s=float(heard["heard_s"]),
-        pose=heard["pose"].copy(),
-        announced_s=-1.0 if silent else float(heard["announced_s"]),
-        viewpoint=announced[:5],
-        depth_m=float(announced[5]),
-        half_angle_rad=float(announced[6]),
-        silent=silent,
     )

@@ -147,7 +147,7 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
             read_only(state.scan_utility_bits[here][:rays]),
         ),
         teammates={
-            mate: _teammate(rules.params[mate], heard[mate], time_s)
+            mate: teammate_view(heard[mate], bool(is_silent(rules.params[mate], heard[mate], time_s)))
             for mate in range(len(heard))
             if mate != robot
         },
@@ -196,8 +196,8 @@ def _path_ahead(params: np.void, own: np.void, estimate: np.void | None, time_s:
     return ahead
 
 
-def _teammate(params: np.void, heard: np.void, time_s: float) -> TeammateView:
-    silent = bool(is_silent(params, heard, time_s))
+def teammate_view(heard: np.void, silent: bool) -> TeammateView:
+    """Return what is known of a teammate, of which HEARD was heard, and which may count as silent now."""
     announced = np.zeros(7) if silent else heard["announced"].copy()
     return TeammateView(
         heard_s=float(heard["heard_s"]),
