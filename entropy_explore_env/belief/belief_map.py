@@ -10,9 +10,8 @@ import numpy as np
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.validation import is_number
+from entropy_explore_env.worlds.files.voxels import FREE, SOLID, UNKNOWN
 
-FREE, SOLID, UNKNOWN = 0, 1, -1
-"""Labels of voxels: believed free, believed covered, never measured."""
 _ROUNDING = 1e-6
 """A precision above the prior by less than this share is the prior."""
 

@@ -15,10 +15,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.belief_map import FREE, UNKNOWN
 from entropy_explore_env.errors import RecordError, SettingError, WorldError, one_of
 from entropy_explore_env.interop.bag_writer import typestore
-from entropy_explore_env.interop.messages import grid_of_message, matrix_of, pose_of_matrix
+from entropy_explore_env.interop.messages import grid_of_message, matrix_of, percent_of, pose_of_matrix
 from entropy_explore_env.interop.octree import voxels_of_tree
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.validation import checked_path
@@ -239,10 +238,9 @@ class BagReader:
             return MapHeard(time_s, grid.grid, grid.origin, grid.bottom_m, grid.resolution_m, poses)
         if kind == _TREE:
             labels, low = voxels_of_tree(np.asarray(message.data).tobytes(), bool(message.binary))
-            percent = np.where(labels == UNKNOWN, -1, np.where(labels == FREE, 0, 100)).astype(np.int8)
             edge_m = float(message.resolution)
             x, y, z = (float(v) * edge_m for v in low)
-            return MapHeard(time_s, percent, (x, y, 0.0), z, edge_m, poses)
+            return MapHeard(time_s, percent_of(labels), (x, y, 0.0), z, edge_m, poses)
         sensor = frames.to(self._map_frame, message.header.frame_id)
         if sensor is None:
             return None

@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.belief.belief_map import FREE, SOLID, Map
+from entropy_explore_env.belief.belief_map import Map
 from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.interop.map_files import octomap_of
+from entropy_explore_env.interop.messages import percent_of
 from entropy_explore_env.interop.team_maps import joint_map
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.simulation import Missions
@@ -36,7 +37,6 @@ OCTOMAP_TYPES = {
     )
 }
 _POSES_PER_S, _MAP_EVERY_S = 5.0, 2.0
-_PERCENT = {FREE: 0, SOLID: 100}
 
 
 def typestore() -> Any:  # noqa: ANN401 - a Typestore
@@ -270,10 +270,8 @@ class BagWriter:
 
     def _write_plan(self, belief: Map, time_s: float) -> None:
         """Write an OccupancyGrid."""
-        labels, header, grid = belief.labels()[:, :, 0], self._header(time_s, "map"), belief.grid
-        percent = np.full(labels.shape, -1, np.int8)
-        for label, value in _PERCENT.items():
-            percent[labels == label] = value
+        header, grid = self._header(time_s, "map"), belief.grid
+        percent = percent_of(belief.labels()[:, :, 0])
         corner = np.array([*grid.origin_m[:2], 0.0, 0.0, 0.0])
         about = self._make(
             "nav_msgs/msg/MapMetaData",

@@ -19,18 +19,17 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from entropy_explore_env.belief.belief_map import FREE, SOLID, UNKNOWN, Map
+from entropy_explore_env.belief.belief_map import Map
 from entropy_explore_env.errors import MissingExtraError, SettingError, WorldError, one_of
 from entropy_explore_env.robots.rotations import turned_by
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.validation import check_instance, checked_path, is_number
 from entropy_explore_env.worlds.files.archives import arrays, saved
-from entropy_explore_env.worlds.files.voxels import SOLID as WORLD_SOLID
-from entropy_explore_env.worlds.files.voxels import UNKNOWN as WORLD_UNKNOWN
-from entropy_explore_env.worlds.files.voxels import RefusedError, Voxels
+from entropy_explore_env.worlds.files.images import SAVED_AS_UNKNOWN
+from entropy_explore_env.worlds.files.voxels import FREE, SOLID, UNKNOWN, RefusedError, Voxels
 from entropy_explore_env.writing import write_atomically
 
-_SHADES = {FREE: 254, SOLID: 0, UNKNOWN: 205}
+_SHADES = {FREE: 254, SOLID: 0, UNKNOWN: SAVED_AS_UNKNOWN}
 """What map savers write: with the thresholds below every reader's rule gives the labels back."""
 _OCCUPIED_THRESH, _FREE_THRESH = 0.65, 0.196
 _ON_LATTICE = 1e-3
@@ -146,17 +145,11 @@ def _ply_of(belief: Map) -> bytes:
 
 def _npz_of(belief: Map) -> bytes:
     """Return a saved world with the map's arrays beside it."""
-    labels = np.where(belief.labels() == SOLID, WORLD_SOLID, belief.labels()).astype(np.int8)
-    labels[belief.labels() == UNKNOWN] = WORLD_UNKNOWN
     grid = belief.grid
-    archive = io.BytesIO(saved(Voxels(labels, grid.voxel_size_m, grid.origin_m, belief.yaw_rad, name="map")))
-    fields = {"mean": belief.mean, "precision": belief.precision, "sigma_prior": belief.sigma_prior}
-    with zipfile.ZipFile(archive, "a", zipfile.ZIP_DEFLATED) as members:
-        for name, value in fields.items():
-            buffer = io.BytesIO()
-            np.save(buffer, np.asarray(value), allow_pickle=False)
-            members.writestr(f"map_{name}.npy", buffer.getvalue())
-    return archive.getvalue()
+    world = Voxels(belief.labels(), grid.voxel_size_m, grid.origin_m, belief.yaw_rad, name="map")
+    return saved(
+        world, map_mean=belief.mean, map_precision=belief.precision, map_sigma_prior=belief.sigma_prior
+    )
 
 
 def load_map(path: Path | str) -> Map:

@@ -12,6 +12,7 @@ import numpy as np
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.robots.rotations import gaze_of, quaternion_matrix
+from entropy_explore_env.worlds.files.voxels import FREE, SOLID
 
 _LEVEL = 1e-3
 """Largest x and y of the quaternion of a map that lies level."""
@@ -50,6 +51,11 @@ def grid_of_message(message: Any) -> GridMessage:  # noqa: ANN401 - any class wi
     grid = np.ascontiguousarray(rows.astype(np.int8, copy=False).reshape(height, width).T)
     yaw = 2.0 * math.atan2(float(turn[2]), float(turn[3]))
     return GridMessage(grid, (corner[0], corner[1], yaw), resolution_m, corner[2])
+
+
+def percent_of(labels: np.ndarray) -> np.ndarray:
+    """Return what an OccupancyGrid holds for labels of voxels (...): int8 percent, -1 = unknown."""
+    return np.select([labels == FREE, labels == SOLID], [0, 100], -1).astype(np.int8)
 
 
 def pose_of(position: Any, orientation: Any) -> np.ndarray:  # noqa: ANN401

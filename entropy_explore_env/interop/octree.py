@@ -12,8 +12,9 @@ import struct
 
 import numpy as np
 
-from entropy_explore_env.belief.belief_map import FREE, SOLID, UNKNOWN
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.worlds.files.octomap_tree import Leaves, own_labels
+from entropy_explore_env.worlds.files.voxels import FREE, SOLID
 
 _DEPTH = 16
 _MOST_VOXELS = 1 << 27
@@ -33,16 +34,12 @@ def voxels_of_tree(data: bytes, binary: bool) -> tuple[np.ndarray, np.ndarray]:
     if not leaves:
         raise SettingError("octomap.data", f"{len(data)} bytes", "a tree of which something is known")
     table = np.array(leaves, np.int64)
-    corners, widths = table[:, :3], table[:, 3]
+    corners, widths, solid = table[:, :3], table[:, 3], table[:, 4] == SOLID
     low, high = corners.min(axis=0), (corners + widths[:, None]).max(axis=0)
     if np.prod((high - low).astype(float)) > _MOST_VOXELS:
         raise SettingError("octomap.data", (high - low).tolist(), f"a box of at most {_MOST_VOXELS} voxels")
-    labels = np.full(tuple(high - low), UNKNOWN, np.int8)
-    single = widths == 1
-    labels[tuple((corners[single] - low).T)] = table[single, 4]
-    for x, y, z, width, label in table[~single] - [*low, 0, 0]:
-        labels[x : x + width, y : y + width, z : z + width] = label
-    return labels, low
+    x, y, z = (high - low).tolist()
+    return own_labels(Leaves(corners - low, widths, solid), (x, y, z)), low
 
 
 def _children_of(corner: tuple[int, int, int], width: int) -> list[tuple[int, int, int]]:

@@ -12,7 +12,7 @@ from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.replay import main as replay
-from entropy_explore_env.belief.belief_map import FREE, SOLID, UNKNOWN, Map
+from entropy_explore_env.belief.belief_map import Map
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import RecordError, SettingError, WorldError
 from entropy_explore_env.explorer.explorer import Explorer
@@ -26,6 +26,7 @@ from entropy_explore_env.robots.rotations import quaternion_of
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import find_scenario
+from entropy_explore_env.worlds.files.voxels import FREE, SOLID, UNKNOWN
 
 TYPES = {
     "/map": "nav_msgs/msg/OccupancyGrid",

@@ -8,11 +8,12 @@ import pytest
 import trimesh
 
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted
-from entropy_explore_env.belief.belief_map import FREE, SOLID, UNKNOWN, Map
+from entropy_explore_env.belief.belief_map import Map
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
 from entropy_explore_env.interop.map_files import load_map, save_map
 from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.worlds.files.voxels import FREE, SOLID, UNKNOWN
 from entropy_explore_env.worlds.load import load_world
 
 

@@ -39,8 +39,8 @@ MAX_NAME = 256
 _SOME_SOLID = {"unknown": UNKNOWN, "unreadable": UNREADABLE}
 
 
-def saved(world: Voxels) -> bytes:
-    """Return the archive of a world."""
+def saved(world: Voxels, **beside: Any) -> bytes:  # noqa: ANN401 - arrays and numbers
+    """Return the archive of a world, with other entries beside it, which readers of worlds leave alone."""
     entries: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
@@ -57,7 +57,7 @@ def saved(world: Voxels) -> bytes:
         if (mask := world.labels == label).any():
             entries[name] = np.packbits(mask)
     buffer = io.BytesIO()
-    np.savez_compressed(buffer, **entries)
+    np.savez_compressed(buffer, **entries, **beside)
     return buffer.getvalue()
 
 

@@ -45,13 +45,13 @@ _SLAB_VOXELS = 1 << 21
 """Voxels of a slab, in which leaves are summed up."""
 
 
-class _Leaves(NamedTuple):
+class Leaves(NamedTuple):
     """The N leaves of a tree: cubes, in voxels of its own resolution from its lower corner."""
 
     corner: np.ndarray
-    """(N, 3) int32, lower corner."""
+    """(N, 3) whole numbers, lower corner."""
     width: np.ndarray
-    """(N,) int32, edge."""
+    """(N,) whole numbers, edge."""
     solid: np.ndarray
     """(N,) bool; the others are free."""
 
@@ -76,7 +76,7 @@ def read(path: Path, options: Options) -> Voxels:
         raise RefusedError(f"an OctoMap whose box holds at most {_VOXELS_PER_BYTE} voxels a byte")
     leaves = _leaves(tree, low, edge, extent)
     del tree
-    labels = _own_labels(leaves, shape) if own else _summed_labels(leaves, scale, shape)
+    labels = own_labels(leaves, shape) if own else _summed_labels(leaves, scale, shape)
     return Voxels(labels, edge if own else wanted_m, (float(low[0]), float(low[1]), float(low[2])))
 
 
@@ -167,7 +167,7 @@ def _levels(children: list[int]) -> int:
     return most
 
 
-def _leaves(tree: Any, low: np.ndarray, edge: float, extent: np.ndarray) -> _Leaves:  # noqa: ANN401
+def _leaves(tree: Any, low: np.ndarray, edge: float, extent: np.ndarray) -> Leaves:  # noqa: ANN401
     """All leaves, every one a cube of 2^(16 - depth) voxels, in a compact form: 17 bytes each."""
     rows = (
         (leaf.getX(), leaf.getY(), leaf.getZ(), leaf.getDepth(), tree.isNodeOccupied(leaf))
@@ -180,13 +180,13 @@ def _leaves(tree: Any, low: np.ndarray, edge: float, extent: np.ndarray) -> _Lea
         corner = np.rint((table[:, :3] - low) / edge - 0.5 * width[:, None])
         if not ((corner >= 0).all() and (corner + width[:, None] <= extent).all()):
             raise RefusedError("an OctoMap whose leaves lie inside its bounds")
-        parts.append(_Leaves(corner.astype(np.int32), width.astype(np.int32), table[:, 4] > 0.5))
+        parts.append(Leaves(corner.astype(np.int32), width.astype(np.int32), table[:, 4] > 0.5))
     if not parts:
         raise RefusedError("a whole OctoMap tree")
-    return _Leaves(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    return Leaves(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-def _own_labels(leaves: _Leaves, shape: tuple[int, int, int]) -> np.ndarray:
+def own_labels(leaves: Leaves, shape: tuple[int, int, int]) -> np.ndarray:
     """(X, Y, Z) int8 labels at the tree's own resolution."""
     labels = np.full(shape, UNKNOWN, np.int8)
     label = np.where(leaves.solid, SOLID, FREE).astype(np.int8)
@@ -198,7 +198,7 @@ def _own_labels(leaves: _Leaves, shape: tuple[int, int, int]) -> np.ndarray:
     return labels
 
 
-def _summed_labels(leaves: _Leaves, scale: float, shape: tuple[int, int, int]) -> np.ndarray:
+def _summed_labels(leaves: Leaves, scale: float, shape: tuple[int, int, int]) -> np.ndarray:
     """(X, Y, Z) int8 labels of voxels `scale` own ones wide, by the volumes of leaves.
 
     By the rule of `resampling`.
