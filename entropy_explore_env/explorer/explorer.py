@@ -7,7 +7,6 @@ chooses from a `RobotView`, which is filled here from what the map says instead 
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -18,10 +17,12 @@ from entropy_explore_env.belief.belief_map import Map
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.explorer.canvas import grid_of
 from entropy_explore_env.explorer.goals import Decider, Goal, NoGoal, Why
-from entropy_explore_env.explorer.ground import Ground, Patch, boxes_around, nominal_grid
+from entropy_explore_env.explorer.ground import Ground, boxes_around
 from entropy_explore_env.explorer.occupancy import UNKNOWN_BETWEEN, Values, checked_origin, occupancy_of
+from entropy_explore_env.explorer.patches import Patch, has_size, patch_of_map, patch_of_occupancy
 from entropy_explore_env.explorer.planned_rate import PlannedRate
 from entropy_explore_env.explorer.poses import checked_pose, poses_by_number
+from entropy_explore_env.explorer.task import task_of
 from entropy_explore_env.explorer.team import Seat, view_of_seat
 from entropy_explore_env.explorer.workspace import Outlook, Workspace
 from entropy_explore_env.interop.messages import grid_of_message
@@ -30,26 +31,15 @@ from entropy_explore_env.planner.weights import PlannerWeights, shipped_weights
 from entropy_explore_env.randomness import Stream, check_seed, generator
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.rotations import turned_by
-from entropy_explore_env.settings.changes import with_settings
-from entropy_explore_env.settings.ending import Ending
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.scenario import Scenario
-from entropy_explore_env.settings.scenarios import OFFICE, find_scenario
 from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.settings.validation import is_number, is_whole
 
-_KNOWN_SIGMA = 0.03
-"""σ of what an occupancy grid says, unless the task asks for a finer one."""
-_FINER = 0.99
-"""What is known is known a little better than the task asks for, so that rounding does not matter."""
 _NOTHING_BITS = 1e-6
 """Expected bits up to which a scan brings nothing."""
 _SAME_PLACE = 1e-3
 """Voxel edges by which a robot may miss its viewpoint and stand in it all the same."""
-_SAME_SIZE = 1e-3
-"""Share by which the size of voxels of a map may differ from what was asked for: float32 in messages."""
-_DEFAULT = dataclasses.replace(OFFICE, name="explorer", ending=Ending(seen_share=1.0, sigma_end=0.5))
-"""Ground robots with a scanner that are to see everything."""
 
 
 class Explorer:
@@ -96,23 +86,11 @@ class Explorer:
         Raises:
             SettingError: A setting is not allowed.
         """
-        fixed = scenario is not None and voxel_size_m is None
-        base = _DEFAULT if scenario is None else find_scenario(scenario, robots)
-        count = 1 if robots is None and scenario is None else robots
-        parts = {"robots": count, "robot": robot, "sensor": sensor}
-        changes: dict[str, Any] = {name: value for name, value in parts.items() if value is not None}
         if strategy is not None and weights is not None:
             raise SettingError("weights", weights, "None where a strategy is given")
         if not is_number(arrival_m) or not 0.0 <= arrival_m < math.inf:
             raise SettingError("arrival_m", arrival_m, "a finite number ≥ 0")
-        if not fixed:
-            size_m = base.grid.voxel_size_m if voxel_size_m is None else voxel_size_m
-            if not is_number(size_m) or not 1e-6 <= size_m <= 1e6:
-                raise SettingError("voxel_size_m", size_m, "a number from 1e-6 to 1e6")
-            bodies = [robot or base.robot, *(kind.robot for kind in base.extra_kinds)]
-            widest_m = max(4.0 * body.body_radius_m for body in bodies)
-            changes["grid"] = nominal_grid(size_m, widest_m, max(body.sensor_height_m for body in bodies))
-        self._task = with_settings(base, {**changes, "action": {"kind": "continuous"}})
+        self._task = task_of(scenario, robots, robot, sensor, voxel_size_m)
         planned = shipped_weights(weights) if isinstance(weights, str) else weights
         self._strategy = PlannedRate(planned) if strategy is None else strategy
         self._seed, self._arrival_m = check_seed(seed), float(arrival_m)
@@ -124,7 +102,7 @@ class Explorer:
         self._begun, self._yaw_rad, self._time_s = 0, 0.0, 0.0
         self._unbegun: set[int] = set()
         self.no_goal: NoGoal | None = None
-        self._ground = Ground(self._task, fixed)
+        self._ground = Ground(self._task, fixed=scenario is not None and voxel_size_m is None)
         self._follow()
 
     def _follow(self) -> None:
@@ -179,21 +157,15 @@ class Explorer:
                 has changed then.
         """
         if isinstance(grid, Map):
-            if abs(grid.grid.voxel_size_m / self._task.grid.voxel_size_m - 1.0) > _SAME_SIZE:
-                raise SettingError("grid", grid, f"a map with voxels of {self._task.grid.voxel_size_m:g} m")
-            (x, y, z), known, prior = grid.grid.origin_m, grid.known, np.float32(self._task.sigma_prior**-2)
-            precision = np.where(known, np.maximum(grid.precision, prior), prior)
-            self._take_map(Patch(grid.mean, precision, known, (x, y, grid.yaw_rad), z))
+            self._take_map(patch_of_map(grid, self._task))
             return
-        mean, known = occupancy_of(grid, values, unknown_between)
+        occupancy = occupancy_of(grid, values, unknown_between)
         if not is_number(bottom_m) or not abs(bottom_m) <= 1e9:
             raise SettingError("bottom_m", bottom_m, "a finite number")
-        if origin is None and self._shape not in (None, mean.shape):
+        if origin is None and self._shape not in (None, occupancy.mean.shape):
             raise SettingError("origin", None, f"(x, y, yaw) of a map that is no longer {self._shape}")
         corner = self._corner if origin is None else checked_origin(origin)
-        sigma = _FINER * min(_KNOWN_SIGMA, self._task.ending.sigma_end)
-        precision = np.where(known, np.float32(sigma**-2), np.float32(self._task.sigma_prior**-2))
-        self._take_map(Patch(mean, precision, known, corner, float(bottom_m)))
+        self._take_map(patch_of_occupancy(occupancy, corner, float(bottom_m), self._task))
 
     def set_map_message(self, message: Any, **how: Any) -> None:  # noqa: ANN401 - any class with the fields
         """Take a nav_msgs/OccupancyGrid, whose rows run along x, in whatever class; `how` as of `set_map`.
@@ -202,7 +174,7 @@ class Explorer:
             SettingError: It is none, or its voxels have another size. Nothing has changed then.
         """
         about = grid_of_message(message)
-        if abs(about.resolution_m / self._task.grid.voxel_size_m - 1.0) > _SAME_SIZE:
+        if not has_size(about.resolution_m, self._task):
             allowed = f"voxel_size_m, which is {self._task.grid.voxel_size_m:g}"
             raise SettingError("message.info.resolution", about.resolution_m, allowed)
         bottom_m = 0.0 if self._task.planar else about.bottom_m
@@ -383,10 +355,10 @@ class Explorer:
             viewpoint = checked_pose("viewpoint chosen", chosen)
             outlook = workspace.outlook(robot, pose, viewpoint)
             stands = self._apart_m(robot, pose, viewpoint) < 0.5 * self._task.grid.voxel_size_m
-            if not (robot in self._unbegun and stands and outlook.bits <= _NOTHING_BITS):
-                self._unbegun.discard(robot)
-                return viewpoint, outlook
+            begins = robot in self._unbegun
             self._unbegun.discard(robot)
+            if not (begins and stands and outlook.bits <= _NOTHING_BITS):
+                return viewpoint, outlook
             seat.target, end = viewpoint.copy(), MoveEnd.ARRIVED
 
     def _told(

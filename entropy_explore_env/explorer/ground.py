@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.replacement import replace_region
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.explorer.canvas import Canvas, box_of, grid_of
+from entropy_explore_env.explorer.patches import Patch
 from entropy_explore_env.explorer.workspace import Workspace
 from entropy_explore_env.robots.rotations import turned_by
 from entropy_explore_env.settings.grid import Grid
@@ -20,21 +20,6 @@ from entropy_explore_env.settings.sensor import RangeSensor
 
 _MARGIN = 32
 """Voxels of unknown space that lie around what is known at least; fewer where the sensor sees less far."""
-
-
-class Patch(NamedTuple):
-    """A map that was given."""
-
-    mean: np.ndarray
-    """(X, Y, Z) float32 expected coverage."""
-    precision: np.ndarray
-    """(X, Y, Z) float32; that of the prior where nothing is known."""
-    known: np.ndarray
-    """(X, Y, Z) bool."""
-    corner: tuple[float, float, float]
-    """x, y, yaw in the map frame."""
-    bottom_m: float
-    """Height of the corner."""
 
 
 class Ground:
@@ -178,12 +163,6 @@ class Ground:
         bits = float(replace_region(belief, canvas.grid.shape, low, arrays, boxes, gains))
         self.entropy_bits -= bits
         return bits, gains
-
-
-def nominal_grid(voxel_size_m: float, widest_m: float, highest_m: float) -> Grid:
-    """Return a grid in which a task can be checked before there is a map, for bodies that large."""
-    wide, high = (int(length_m / voxel_size_m) + 2 for length_m in (max(widest_m, 1.0), highest_m))
-    return Grid((wide, wide, high), float(voxel_size_m))
 
 
 def boxes_around(places: Sequence[np.ndarray | None], reaches_m: Sequence[float], grid: Grid) -> np.ndarray:
