@@ -79,8 +79,9 @@ class Explorer:
             voxel_size_m: Edge of the maps' voxels, in place of the scenario's.
             robots: Number of robots; None = the scenario's, and 1 without one.
             strategy: Chooses the viewpoints; None = `planned-rate`.
-            weights: Of its features, or the name of those that come with the library, "plans"; None = none.
-            seed: Of all random draws.
+            weights: Weights of the planner's features, or the name of weights that come with the library,
+                "plans"; None = it has none.
+            seed: Seed of all random draws.
             arrival_m: A robot this near to its viewpoint, or nearer, has reached it.
 
         Raises:
@@ -153,8 +154,8 @@ class Explorer:
             unknown_between: Probabilities from the first to the second are unknown.
 
         Raises:
-            SettingError: The map is none, has changed its size without an origin, or knows nothing. Nothing
-                has changed then.
+            SettingError: The grid is no map, has another size than the latest one and no origin, or holds
+                nothing that is known. Nothing has changed then.
         """
         if isinstance(grid, Map):
             self._take_map(patch_of_map(grid, self._task))
@@ -168,10 +169,10 @@ class Explorer:
         self._take_map(patch_of_occupancy(occupancy, corner, float(bottom_m), self._task))
 
     def set_map_message(self, message: Any, **how: Any) -> None:  # noqa: ANN401 - any class with the fields
-        """Take a nav_msgs/OccupancyGrid, whose rows run along x, in whatever class; `how` as of `set_map`.
+        """Take a nav_msgs/OccupancyGrid of any class, whose rows run along x; `how` as for `set_map`.
 
         Raises:
-            SettingError: It is none, or its voxels have another size. Nothing has changed then.
+            SettingError: It is no OccupancyGrid, or its voxels have another size. Nothing has changed then.
         """
         about = grid_of_message(message)
         if not has_size(about.resolution_m, self._task):
@@ -198,8 +199,8 @@ class Explorer:
         Args:
             pose: (5,) of the sensor, map frame.
             measured: (R,) ranges in metres along the sensor's R rays: 0, negative or NaN where nothing was
-                measured. Those beyond the sensor's range, or inf, say that the ray is free up to it. Or
-                (N, 3) points in the map frame, a hit each.
+                measured. A range beyond the sensor's, or inf, means that the ray is free up to the sensor's.
+                Or (N, 3) points in the map frame, a hit each.
             robot: Number of the robot that took it.
 
         Raises:
@@ -252,7 +253,7 @@ class Explorer:
         Raises:
             CallOrderError: Neither a map nor a scan was given.
             SettingError: A pose is missing, not finite, outside the map or in a wall; the clock runs back; or
-                a value is none. Nothing has changed then.
+                a value is not allowed. Nothing has changed then.
         """
         workspace, number = self._ground.workspace, self._checked_robot(robot)
         given = poses_by_number(poses, len(self._seats))

@@ -36,8 +36,8 @@ class Goal:
         path: (N, 3) points to which to drive straight, one after the other, through what is believed free; it
             ends at the viewpoint, or as near as a path is known.
         expected_bits: Bits that a scan at the viewpoint should bring.
-        seconds: Until that scan is taken.
-        why: What it is for.
+        seconds: Time until that scan is taken.
+        why: Purpose of the goal.
     """
 
     viewpoint: np.ndarray

@@ -1,6 +1,6 @@
 """What a node does with messages: maps and poses in, goals for Nav2 and markers out.
 
-All of it works on the fields of messages, in whatever class, so that it runs and is tested without ROS. The
+All of it works on the fields of messages of any class, so that it runs and is tested without ROS. The
 node itself is `docs/ros2/entropy_explore_ros`.
 """
 
@@ -23,7 +23,7 @@ from entropy_explore_env.settings.sensor import RangeSensor
 SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 """Statuses of action_msgs/GoalStatus at an action's end."""
 _ARROW, _ADD, _DELETE = 0, 0, 2
-"""Of visualization_msgs/Marker."""
+"""Type and actions of a visualization_msgs/Marker."""
 _COLOURS = ((0.0, 0.45, 0.7), (0.9, 0.6, 0.0), (0.0, 0.6, 0.5), (0.8, 0.4, 0.7))
 
 

@@ -38,7 +38,7 @@ def occupancy_of(
         unknown_between: Probabilities from the first to the second are unknown, too.
 
     Raises:
-        SettingError: The grid is none, or has values that the form does not have.
+        SettingError: The grid is no such array, or holds values that its form does not allow.
     """
     array = grid if isinstance(grid, np.ndarray) else np.asarray(None)
     if array.ndim not in (2, 3) or array.dtype.kind not in "biuf" or not 0 < array.size <= MAX_VOXELS:

@@ -29,7 +29,7 @@ def poses_by_number(poses: object, robots: int) -> dict[int, np.ndarray]:
     """Return number → pose (5,), of poses in one of the forms that `Explorer.goal` takes.
 
     Raises:
-        SettingError: They are none.
+        SettingError: They have none of these forms.
     """
     if isinstance(poses, Mapping):
         for number in poses:

@@ -114,11 +114,11 @@ class BagReader:
     def __init__(
         self, path: Path | str, topic: str | None = None, map_frame: str = "map", robots: Sequence[str] = ()
     ) -> None:
-        """Look what a bag holds.
+        """Look at what a bag holds.
 
         Args:
             path: Folder of a ROS 2 bag, an .mcap or .db3 in it, or a .bag of ROS 1.
-            topic: Of the map or scans; None = all topics of a map's type, or of scans where there are none.
+            topic: Topic of the map or scans; None = all topics of maps, or of scans where there are no maps.
             map_frame: The frame in which poses are wanted.
             robots: Their frames; None given = those of Odometry, or base_footprint or base_link.
 
@@ -253,7 +253,7 @@ def world_of_bag(path: Path | str, topic: str | None = None) -> World:
     """Return the world of the last map of a bag; unknown space is solid.
 
     Raises:
-        RecordError, SettingError, MissingExtraError: As of `BagReader`.
+        RecordError, SettingError, MissingExtraError: As for `BagReader`.
         WorldError: It has no map, or one without free space.
     """
     reader, last = BagReader(path, topic), None

@@ -62,7 +62,7 @@ class BagWriter:
         """Begin a bag; `note` follows the mission.
 
         Args:
-            missions: Of which the first is written.
+            missions: Missions, the first of which is written.
             folder: The bag, which must not exist.
 
         Raises:

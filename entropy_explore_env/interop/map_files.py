@@ -45,7 +45,7 @@ def save_map(belief: Map, path: Path | str, heights_m: tuple[float, float] | Non
         heights_m: map_server's files of 3-D maps: a column is solid if a voxel between these two heights is.
 
     Raises:
-        SettingError: It is no Map, the suffix is another one, or the form cannot hold the map.
+        SettingError: It is no Map, no form has this suffix, or the form cannot hold the map.
         MissingExtraError: A package is not installed.
         OSError: A file cannot be written.
     """

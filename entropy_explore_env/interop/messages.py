@@ -1,4 +1,4 @@
-"""Fields of ROS's messages as arrays and poses; whatever class has the fields will do.
+"""Fields of ROS's messages as arrays and poses; any class that has the fields will do.
 
 A pose here is (x, y, z, yaw, pitch): metres, radians, pitch downwards, as everywhere in the library.
 """

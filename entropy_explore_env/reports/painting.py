@@ -113,8 +113,8 @@ class Painter:
     def paint(self, missions: Missions) -> np.ndarray:
         """Draw this moment of the mission: the belief of robot_0, and the whole team.
 
-        Robots that drift are drawn where they believe to be, which is the map's frame, with an ellipse of two
-        standard deviations and a line to where they are; the paths are those that they truly drove.
+        Robots that drift are drawn where they believe they are, which is the map's frame, with an ellipse of
+        two standard deviations and a line to where they are; the paths are those that they truly drove.
 
         Args:
             missions: The curves and the driven paths show the moments at which they were watched.

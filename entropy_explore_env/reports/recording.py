@@ -32,7 +32,7 @@ def stopped_now(missions: Missions, mission: int) -> np.ndarray:
 
 
 def believed_poses_now(missions: Missions, mission: int) -> np.ndarray:
-    """Return (A, 5) float64 where a mission's robots believe to be: `poses_now` where no robot drifts."""
+    """Return (A, 5) float64 where a mission's robots believe they are: `poses_now` where no robot drifts."""
     poses = poses_now(missions, mission)
     if missions.estimates is None:
         return poses
