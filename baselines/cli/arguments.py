@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from baselines.cli.help import help_text
-from baselines.cli.options import Option, options_of, values_of
+from baselines.cli.options import Option, options_of
 from entropy_explore_env import command
 from entropy_explore_env.command import LineParser, UsageError
 from entropy_explore_env.errors import SettingError
@@ -95,7 +95,7 @@ def _given(options: Iterable[Option], words: Sequence[str]) -> dict[str, Any]:
 
 def _add(parser: argparse.ArgumentParser, option: Option) -> None:
     """Let a parser take an option."""
-    values = values_of(option.kind)
+    values = option.values
 
     def read(word: str) -> Any:  # noqa: ANN401
         try:
@@ -111,14 +111,12 @@ def _add(parser: argparse.ArgumentParser, option: Option) -> None:
         parser.add_argument(option.flag, dest=option.name, action="store_const", const=True)
         parser.add_argument(option.opposite, dest=option.name, action="store_const", const=False)
     else:
-        parser.add_argument(
-            option.flag, *option.also, dest=option.name, nargs=values.count, type=read, metavar=values.shown
-        )
+        parser.add_argument(option.flag, *option.also, dest=option.name, nargs=values.count, type=read)
 
 
 def _joined(option: Option, value: Any) -> Any:  # noqa: ANN401
     """Return an option's value out of those of its words."""
-    joined = values_of(option.kind).joined
+    joined = option.values.joined
     if joined is None:
         return value
     try:
@@ -159,7 +157,7 @@ def _takes(option: Option, word: str | None) -> bool:
     if word is None or option.kind is bool:
         return word is None and option.kind is bool
     try:
-        values_of(option.kind).read(word)
+        option.values.read(word)
     except ValueError:
         return False
     return True

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import math
 import re
 import shutil
 import textwrap
@@ -11,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from baselines.cli.options import Option, values_of
+from baselines.cli.options import Option
 from entropy_explore_env.command import UsageError
 from entropy_explore_env.errors import counted, did_you_mean
 
@@ -104,7 +103,7 @@ def _entry(option: Option, width: int, whole: bool = False) -> list[str]:
     text = option.text if whole else option.text.split("\n")[0]
     default = _default(option)
     if default and "default" not in text:
-        text = f"{text} (default: {default})" if "\n" not in text else f"{text}\n(default: {default})"
+        text += ("\n" if "\n" in text else " ") + f"(default: {default})"
     return _entry_of(_typed(option), text, width)
 
 
@@ -114,15 +113,13 @@ def _typed(option: Option) -> str:
         return _upper(option)
     if option.kind is bool:
         return f"{option.flag}, {option.opposite}" if option.default is True else option.flag
-    values = values_of(option.kind)
-    words = (
-        f"{values.shown} ..." if values.count == "*" else " ".join([values.shown] * int(values.count or 1))
-    )
+    shown, count = option.values.shown, option.values.count
+    words = f"{shown} ..." if count == "*" else " ".join([shown] * int(count or 1))
     return f"{', '.join((option.flag, *option.also))} {words}"
 
 
 def _upper(option: Option) -> str:
-    return option.name.upper() + (" ..." if values_of(option.kind).count == "*" else "")
+    return option.name.upper() + (" ..." if option.values.count == "*" else "")
 
 
 def _entry_of(left: str, text: str, width: int) -> list[str]:
@@ -146,8 +143,8 @@ def _default(option: Option) -> str:
 
 
 def _shown(value: Any) -> str:  # noqa: ANN401
-    if isinstance(value, float) and math.isfinite(value):
-        return f"{value:.6g}"
+    if isinstance(value, float):
+        return f"{value:g}"
     return value.name if isinstance(value, Path) and value.is_absolute() else str(value)
 
 

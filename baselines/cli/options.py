@@ -11,6 +11,8 @@ import types
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from enum import Enum
+from functools import cache, cached_property
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Union, get_args, get_origin, get_type_hints
 
@@ -62,7 +64,8 @@ class Option:
         part: Where it belongs, such as `robot`; None for the command's own.
         kind: Type of its value.
         default: Value where it is not given.
-        text: What the help says of it.
+        owner: The dataclass that has it as a field.
+        notes: What the help says of it after the field's own text.
         positional: Whether it has no flag.
         also: Further flags.
     """
@@ -72,7 +75,8 @@ class Option:
     part: Part | None
     kind: Any
     default: Any
-    text: str
+    owner: type
+    notes: tuple[str, ...] = ()
     positional: bool = False
     also: tuple[str, ...] = ()
 
@@ -87,6 +91,16 @@ class Option:
         prefix, dot, last = self.flag[2:].rpartition(".")
         return f"--{prefix}{dot}no-{last}"
 
+    @property
+    def text(self) -> str:
+        """What the help says of it."""
+        return "\n".join([_texts(self.owner).get(self.path[-1], ""), *self.notes]).strip()
+
+    @cached_property
+    def values(self) -> Values:
+        """The words that it takes."""
+        return values_of(self.kind)
+
 
 def options_of(kind: type, default: Any) -> list[Option]:  # noqa: ANN401 - an instance of the dataclass
     """Return the options in the fields of a dataclass, and in dataclasses within it.
@@ -94,7 +108,12 @@ def options_of(kind: type, default: Any) -> list[Option]:  # noqa: ANN401 - an i
     Args:
         kind: The dataclass.
         default: An instance with the values of options that are not given.
+
+    Raises:
+        MissingExtraError: The parser of docstrings, which the help needs, is not installed.
     """
+    if find_spec("docstring_parser") is None:
+        raise MissingExtraError("docstring_parser", "baselines")
     return list(_options_of(kind, default, (), "", None))
 
 
@@ -105,7 +124,7 @@ def _options_of(
     prefix: str,
     part: Part | None,
 ) -> Iterator[Option]:
-    texts, hints = _texts(kind), get_type_hints(kind, include_extras=True)
+    hints = get_type_hints(kind, include_extras=True)
     for field in dataclasses.fields(kind):
         hint, notes = hints[field.name], []
         if get_origin(hint) is Annotated:
@@ -119,22 +138,17 @@ def _options_of(
                 within = Part(field.name.replace("_", "-"), text)
             yield from _options_of(hint, value, here, inner, within)  # type: ignore[arg-type]
             continue
-        text = "\n".join([texts.get(field.name, ""), *(note for note in notes if isinstance(note, str))])
+        said = tuple(note for note in notes if isinstance(note, str))
         also = tuple(note.flag for note in notes if isinstance(note, Also))
         name = prefix + field.name
-        yield Option(here, name, part, hint, value, text.strip(), Mark.POSITIONAL in notes, also)
+        yield Option(here, name, part, hint, value, kind, said, Mark.POSITIONAL in notes, also)
 
 
+@cache
 def _texts(kind: type) -> dict[str, str]:
-    """Return what a dataclass says of its fields, one line each.
+    """Return what a dataclass says of its fields, one line each; reading the source takes a while."""
+    from docstring_parser import parse_from_object
 
-    Raises:
-        MissingExtraError: The parser of docstrings is not installed.
-    """
-    try:
-        from docstring_parser import parse_from_object
-    except ImportError:
-        raise MissingExtraError("docstring_parser", "baselines") from None
     texts: dict[str, str] = {}
     for parent in reversed(kind.__mro__):
         if dataclasses.is_dataclass(parent):
