@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar
 
-from baselines.cli.arguments import make_folder, parse, print_json, run_command, told_command
+from baselines.cli.arguments import given_values, make_folder, parse, print_json, run_command, told_command
 from baselines.cli.options import Mark
 from baselines.cli.task_options import TaskOptions, given_in, is_of_task, is_whole_scenario
 from baselines.cli.worker_options import TrialOptions
@@ -160,16 +160,17 @@ def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
     if args.world_scenario is not None and args.world_scenario not in SCENARIOS:
         raise SettingError("world_scenario", args.world_scenario, one_of(args.world_scenario, SCENARIOS))
     strategies = chosen_strategies(args.strategies)
+    given = given_values(Args, words).get("task", {})
     robots, names, refused = args.robots or default_sizes(args.task, args.quick), args.scenarios, []
     if is_whole_scenario(args.task.settings):
         if names is not None:
             raise SettingError("scenarios", names, "no value: --settings holds a scenario of its own")
-        tasks = scenario_tasks(None, args.task, words, robots, missions)
+        tasks = scenario_tasks(None, given, robots, missions)
     elif args.task.world and names is None:
-        tasks, refused = world_tasks(args.world_scenario, args.task, words, robots, missions)
+        tasks, refused = world_tasks(args.world_scenario, given, robots, missions)
     else:
         names = (QUICK_SCENARIOS if args.quick else DEFAULT_SCENARIOS) if names is None else names
-        tasks = scenario_tasks(names, args.task, words, robots, missions)
+        tasks = scenario_tasks(names, given, robots, missions)
     return Suite("own", "Scenarios of one's own", tasks, strategies), refused
 
 

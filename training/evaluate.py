@@ -82,7 +82,6 @@ def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
     if (args.pretrained is None) == (args.strategy is None):
-        parse(Args, words, description=__doc__)  # the help, if it is asked for
         raise SettingError("strategy", args.strategy, "either --strategy or --pretrained")
     check_whole("seeds", args.seeds, 1)
     workers = args.workers

@@ -60,7 +60,17 @@ def parse(
         about = description or kind.__doc__ or ""
         print(help_text(_program(), about, options, getattr(kind, "usual", ()), topic))
         raise SystemExit(0)
-    return overlaid(start, _given(options, [_spelled(word) for word in words]))
+    return overlaid(start, _given(options, words))
+
+
+def given_values(kind: type, words: Sequence[str]) -> dict[str, Any]:
+    """Return the values that a command line gives, by the names of fields; those of a dataclass within it.
+
+    Args:
+        kind: The dataclass of the command's arguments.
+        words: What follows the command; `parse` takes them.
+    """
+    return _given(options_of(kind, kind()), words)
 
 
 def _spelled(word: str) -> str:
@@ -76,7 +86,7 @@ def _given(options: Iterable[Option], words: Sequence[str]) -> dict[str, Any]:
     parser = LineParser(_program(), add_help=False, allow_abbrev=False, argument_default=argparse.SUPPRESS)
     for option in options:
         _add(parser, option)
-    found, unknown = parser.parse_known_intermixed_args(words)
+    found, unknown = parser.parse_known_intermixed_args([_spelled(word) for word in words])
     if unknown and unknown[0].startswith("-"):
         raise UsageError(f"{unknown[0]}: no such option{_meant(unknown, options) or '; see --help'}")
     if unknown:

@@ -15,7 +15,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, NamedTuple, Protocol, TypeVar
 
-from baselines.cli.arguments import overlaid
+from baselines.cli.arguments import given_values, overlaid
 from baselines.cli.options import Mark
 from baselines.cli.start_options import given_json, reset_options
 from baselines.cli.world_options import Reading, world_settings
@@ -104,11 +104,10 @@ class BaseTask(NamedTuple):
     decision_period_s: float | None
     """That a file of settings asks for; None = as soon as a robot has to decide."""
 
-    def defaults(self, settings: str | None = None) -> TaskOptions:
+    def defaults(self) -> TaskOptions:
         """Return the options whose values are the task's own."""
         scenario = self.scenario
         return TaskOptions(
-            settings=settings,
             split=scenario.split,
             start_radius_m=scenario.start_radius_m,
             decision_period_s=self.decision_period_s,
@@ -194,32 +193,23 @@ def parsed_for(task: BaseTask, args: Arguments, words: Sequence[str], **more: ob
         words: The command line.
         **more: Further fields whose defaults the task says.
     """
-    options, given = options_for(task, args.task, words), given_in(words)
+    given = given_values(type(args), words)
     others = {name: value for name, value in more.items() if name not in given}
+    options = options_for(task, given.get("task", {}))
     return dataclasses.replace(args, task=options, **others)  # type: ignore[type-var]
 
 
-def options_for(task: BaseTask, options: TaskOptions, words: Sequence[str]) -> TaskOptions:
+def options_for(task: BaseTask, given: Mapping[str, Any]) -> TaskOptions:
     """Return a task's own options, changed where a command line says so.
 
     Args:
         task: The task.
-        options: As they were parsed, of whatever task.
-        words: The command line.
+        given: What the command line gives of TaskOptions, as `given_values` has it.
 
     Raises:
         SettingError: An option is not allowed in this task.
     """
-    reading = {each.name for each in dataclasses.fields(Reading)}
-    given: dict[str, Any] = {}
-    for name in filter(is_of_task, given_in(words)):
-        path = [part.removeprefix("no_") for part in name.split(".")]
-        path = ["world_file", *path] if path[0] in reading else path
-        inner, value = given, options
-        for part in path[:-1]:
-            inner, value = inner.setdefault(part, {}), getattr(value, part)
-        inner[path[-1]] = getattr(value, path[-1])
-    return overlaid(task.defaults(options.settings), given)
+    return overlaid(task.defaults(), given)
 
 
 def tasked(

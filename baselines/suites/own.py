@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from baselines.cli.task_options import (
     BaseTask,
@@ -59,14 +60,13 @@ _READ_BY_SOME = {
 
 
 def scenario_tasks(
-    names: str | None, options: TaskOptions, words: Sequence[str], robots: str, missions: int
+    names: str | None, given: Mapping[str, Any], robots: str, missions: int
 ) -> tuple[Task, ...]:
     """Return a task for each scenario and team size.
 
     Args:
         names: Names of scenarios, commas between; None = the scenario that the settings hold as a whole.
-        options: Of the task, as they were parsed.
-        words: The command line.
+        given: What the command line gives of TaskOptions, as `given_values` has it.
         robots: Team sizes, commas between.
         missions: Number of missions of a task.
 
@@ -74,28 +74,27 @@ def scenario_tasks(
         SettingError: An option is not allowed.
         WorldError: A world file cannot be used.
     """
-    given = [None] if names is None else names.split(",")
-    if len(set(given)) < len(given):
+    asked = [None] if names is None else names.split(",")
+    if len(set(asked)) < len(asked):
         raise SettingError("scenarios", names, "each name once")
     tasks = []
-    for name in given:
+    for name in asked:
         if name is not None and name not in SCENARIOS:
             allowed = f"{one_of(name, SCENARIOS)}; world files are given with --world"
             raise SettingError("scenarios", name, allowed)
-        base = base_task(name or "room", options.settings)
-        tasks += _team_tasks(base, options_for(base, options, words), robots, missions)
+        base = base_task(name or "room", given.get("settings"))
+        tasks += _team_tasks(base, options_for(base, given), robots, missions)
     return tuple(tasks)
 
 
 def world_tasks(
-    world_scenario: str | None, options: TaskOptions, words: Sequence[str], robots: str, missions: int
+    world_scenario: str | None, given: Mapping[str, Any], robots: str, missions: int
 ) -> tuple[tuple[Task, ...], list[str]]:
     """Return a task for each world file and team size, and why files are refused.
 
     Args:
         world_scenario: Name of the scenario that gives robots, sensor and voxel size.
-        options: Of the task, as they were parsed; its worlds are the files, or folders of them.
-        words: The command line.
+        given: As in `scenario_tasks`; its worlds are the files, or folders of them.
         robots: Team sizes, commas between.
         missions: Number of missions of a task.
 
@@ -103,13 +102,13 @@ def world_tasks(
         SettingError: An option is not allowed, or a folder holds no world file.
         WorldError: No file can be used.
     """
-    files = [file for path in options.world for file in world_files(Path(path).expanduser())]
+    files = [file for path in given["world"] for file in world_files(Path(path).expanduser())]
     tasks: list[Task] = []
     refused: list[EntropyExploreError] = []
     for name, file in zip(distinct_names(files), files, strict=True):
         scenario = find_scenario(world_scenario or ("office" if is_plan(file) else "room"))
-        base = base_task(dataclasses.replace(scenario, name=name), options.settings)
-        chosen = _for_file(options_for(base, options, words), file, alone=len(files) == 1)
+        base = base_task(dataclasses.replace(scenario, name=name), given.get("settings"))
+        chosen = _for_file(options_for(base, given), file, alone=len(files) == 1)
         try:
             tasks += _team_tasks(base, chosen, robots, missions)
         except (WorldError, SettingError) as error:

@@ -77,7 +77,7 @@ def test_one_robot_alone_pays_less():
     ]
     for made, wanted in environments:
         assert made.scenario.reward == wanted
-    options = base_task("room").defaults(None)
+    options = base_task("room").defaults()
     for scenario, robots, wanted in (
         (SCENARIOS["room"], 1, alone),
         (SCENARIOS["room"], 2, team),

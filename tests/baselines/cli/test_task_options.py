@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from baselines.cli.arguments import parse, told_command
+from baselines.cli.arguments import given_values, parse, told_command
 from baselines.cli.options import options_of
 from baselines.cli.task_options import TaskOptions, base_task, options_for, settled, tasked
 from baselines.experiments.mission import Surroundings, run_mission, scripted_env
@@ -124,11 +124,10 @@ def test_options_are_settled_so_that_they_are_the_same_everywhere(plans, tmp_pat
 def test_what_is_given_changes_each_scenario_and_the_rest_is_its_own(plans):
     words = "--robot.redecide on_scan --channel.no-announcements --ending.time-limit-s=0.1 --split test"
     words += " --robot.localization.yaw-rad-per-sqrt-m 0.01 --fiducials.positions-m 1 2 0.5 3 2 0.5"
-    words = [*words.split(), "--world", *plans, "--height-m", "2.5", "--seeds", "3"]
-    parsed = parse(TaskOptions, words[:-2])
+    words = [*words.split(), "--world", *plans, "--height-m", "2.5"]
     for name in ("office", "cave"):
         own = base_task(name).defaults()
-        given = options_for(base_task(name), parsed, words)
+        given = options_for(base_task(name), given_values(TaskOptions, words))
         assert given.robot == dataclasses.replace(
             own.robot, redecide="on_scan", localization=given.robot.localization
         )
@@ -137,13 +136,13 @@ def test_what_is_given_changes_each_scenario_and_the_rest_is_its_own(plans):
         assert given.ending == dataclasses.replace(own.ending, time_limit_s=0.1)
         assert (given.split, given.world, given.world_file.height_m) == ("test", tuple(plans), 2.5)
         assert given.sensor == own.sensor and given.start_radius_m == own.start_radius_m
-    assert options_for(base_task("office"), TaskOptions(), []) == base_task("office").defaults()
+    assert options_for(base_task("office"), {}) == base_task("office").defaults()
 
 
 def test_an_option_that_is_given_as_the_default_counts():
-    parsed = parse(TaskOptions, ["--robot.reach-m", "0.5"])
-    assert parsed == TaskOptions()  # the room's
-    given = options_for(base_task("office"), parsed, ["--robot.reach-m", "0.5"])
+    words = ["--robot.reach-m", "0.5"]
+    assert parse(TaskOptions, words) == TaskOptions()  # the room's
+    given = options_for(base_task("office"), given_values(TaskOptions, words))
     assert given.robot.reach_m == 0.5 != base_task("office").scenario.robot.reach_m
 
 
