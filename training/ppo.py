@@ -580,7 +580,7 @@ def finished(args: Args, state: TrainingState) -> bool:
 
 
 def told(changed: Mapping[str, object]) -> str:
-    """Return what is said of options that differ from those that a run was started with."""
+    """Return the end of a message about options that differ from those that a run was started with."""
     return "".join(f"; {name} was {value}" for name, value in changed.items())
 
 

@@ -258,7 +258,7 @@ class DecisionAdvantages(ConnectorV2):
         batch: dict[str, Any],
         **kwargs: Any,  # noqa: ANN401 - RLlib's
     ) -> dict[str, Any]:
-        """Return the decisions in an order of chance, with standardised advantages and normalised returns.
+        """Return the decisions in random order, with standardised advantages and normalised returns.
 
         RLlib's minibatches of a first epoch would be decisions of the same few missions.
         """

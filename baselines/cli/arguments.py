@@ -74,7 +74,7 @@ def given_values(kind: type, words: Sequence[str]) -> dict[str, Any]:
 
 
 def _spelled(word: str) -> str:
-    """Return a word as argparse reads it: options with hyphens, negative numbers without an exponent."""
+    """Return a word in the spelling of argparse: hyphens in options, no exponent in negative numbers."""
     if word.startswith("--"):
         name, equals, value = word.partition("=")
         return name.replace("_", "-") + equals + value
@@ -125,7 +125,7 @@ def _add(parser: argparse.ArgumentParser, option: Option) -> None:
 
 
 def _joined(option: Option, value: Any) -> Any:  # noqa: ANN401
-    """Return an option's value out of those of its words."""
+    """Return an option's value, combined from the values of its words."""
     joined = option.values.joined
     if joined is None:
         return value
@@ -140,7 +140,7 @@ _ALIKE = 0.6
 
 
 def _meant(words: Sequence[str], options: Iterable[Option]) -> str:
-    """Return the flag most like an unknown one, as the end of a message.
+    """Return the end of a message: the flag most like an unknown one.
 
     Flags with its prefix come first, and those that take the word that follows it.
     """
@@ -184,7 +184,7 @@ def overlaid(base: Any, changes: Mapping[str, Any]) -> Any:  # noqa: ANN401 - an
 
 
 def _program() -> str:
-    """Return how the command was started, as one types it."""
+    """Return the command as it is typed, such as `python -m baselines.run`."""
     module = getattr(sys.modules["__main__"], "__spec__", None)
     return Path(sys.argv[0]).name if module is None else f"python -m {module.name.removesuffix('.__main__')}"
 

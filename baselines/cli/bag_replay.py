@@ -1,7 +1,7 @@
-"""Plays the maps of a recorded bag through a strategy: its goals, and the milliseconds that they take.
+"""Play the maps of a recorded bag through a strategy: its goals, and the milliseconds that they take.
 
-Robots and sensors are those of a scenario; the bag says where the robots were, and what was known. The robots
-went where they went: goals change nothing in what follows.
+Robots and sensors are those of a scenario; the bag holds the robots' poses and maps. The goals have no effect
+on what the bag plays next.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ class BagArgs:
     bag: Annotated[Path, Mark.POSITIONAL] = Path("bag")
     """The folder of a ROS 2 bag, a file in it, or a .bag of ROS 1."""
     strategy: str = "best"
-    """Who chooses the goals."""
+    """Strategy that chooses the goals."""
     scenario: str | None = None
-    """Whose robots, sensors and ending count; default: ground robots with a scanner, or office-3d in 3-D."""
+    """Scenario of robots, sensors and ending; default: ground robots with a scanner, in 3-D office-3d."""
     topic: str | None = None
     """Topic of the maps or scans; default: all maps, or all scans of a bag without maps."""
     map_frame: str = "map"
-    """The frame in which poses are wanted."""
+    """Frame of the poses."""
     frames: tuple[str, ...] = ()
     """Frames of the robots; default: those of Odometry, or base_footprint or base_link."""
     every_s: float = 1.0
@@ -49,7 +49,7 @@ class BagArgs:
     voxel_size_m: float = _SCAN_VOXEL_M
     """Edge of the voxels of a map that is made from scans."""
     seed: int = 0
-    """Of the strategy's draws."""
+    """Seed of the strategy's draws."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -92,7 +92,7 @@ def replay_bag(args: BagArgs) -> int:
 
 
 def decisions(reader: BagReader, args: BagArgs) -> Iterator[dict[str, Any]]:
-    """Yield what each robot would have done at each moment: figures for JSON."""
+    """Yield the decision of each robot when it is due: figures for JSON."""
     explorer: Explorer | None = None
     due_s = dict.fromkeys(range(len(reader.robots)), -np.inf)
     for heard in reader:

@@ -108,7 +108,7 @@ def _entry(option: Option, width: int, whole: bool = False) -> list[str]:
 
 
 def _typed(option: Option) -> str:
-    """Return how an option is typed."""
+    """Return the form of an option on a command line, such as `--size INT INT`."""
     if option.positional:
         return _upper(option)
     if option.kind is bool:
@@ -133,7 +133,7 @@ def _entry_of(left: str, text: str, width: int) -> list[str]:
 
 
 def _default(option: Option) -> str:
-    """Return an option's default as one types it; empty where it is nothing."""
+    """Return the words of an option's default on a command line; empty if it has no default."""
     value = option.default
     if value is None or value is False or value in ((), [], ""):
         return ""

@@ -204,7 +204,7 @@ class MissionLog:
         return written
 
     def _results(self) -> dict[str, np.ndarray]:
-        """Return what a record keeps for people: poses at all moments, and the team's map now."""
+        """Return the arrays that a record keeps for readers: poses over time, and the team's map."""
         recorder = self.recorder
         arrays = [recorder.time_s, recorder.poses]
         if recorder.missions.grid.voxels <= MOST_MAP_VOXELS:
@@ -213,7 +213,7 @@ class MissionLog:
         return dict(zip(RESULTS, arrays, strict=False))
 
     def _write_folder(self, folder: Path, figures: dict[str, Any]) -> list[Path]:
-        """Return the figures with their series, and the picture of curves and maps."""
+        """Write figures with their series, the picture of curves and maps, and the map; return the files."""
         from baselines.cli.mission_picture import mission_picture
 
         recorder = self.recorder

@@ -256,7 +256,7 @@ def _draw_map(figure: Figure, axes: Axes, shown: _Map, recorder: Recorder, belie
 
 
 def _write_metres(axis: Axis, name: str, low_m: float) -> None:
-    """Write metres along an axis, far from the frame's origin relative to a round number."""
+    """Label an axis in metres; far from the frame's origin, relative to a round number."""
     from_m = base_m(low_m)
     axis.set_major_locator(MaxNLocator(6))
     axis.set_major_formatter(lambda metres, _: f"{metres - from_m:g}")
@@ -310,7 +310,7 @@ def _legend(recorder: Recorder) -> list[Line2D]:
 
 
 def _kind_name(kinds: Sequence[RobotKind], number: int) -> str:
-    """Return what tells a kind of robot from the others: how it moves, if only it does so."""
+    """Return a name that tells a kind of robot from the others: its motion, numbered if others share it."""
     motions = [kind.robot.motion for kind in kinds]
     said = {"free": "flying robot", "planar": "ground robot"}[motions[number]]
     return said if motions.count(motions[number]) == 1 else f"{said} of kind {number}"

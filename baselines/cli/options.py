@@ -40,11 +40,11 @@ class Values(NamedTuple):
     count: int | str | None
     """Number of words: None = one, "*" = any."""
     read: Callable[[str], Any]
-    """Turns a word into a value; the text of its ValueError says what is expected."""
+    """Turns a word into a value; its ValueError says what is expected."""
     shown: str
     """Stands for a word in the help."""
     joined: Callable[[list[Any]], Any] | None = None
-    """Makes the option's value of those of its words; None: there is one word."""
+    """Combines the values of the words into the option's value; None for a single word."""
 
 
 class Part(NamedTuple):
@@ -159,10 +159,10 @@ def _texts(kind: type) -> dict[str, str]:
 
 
 def values_of(kind: Any) -> Values:  # noqa: ANN401 - any type
-    """Return which words are values of a type.
+    """Return how the words of a command line become values of a type.
 
     Raises:
-        TypeError: A field of such a type cannot be an option.
+        TypeError: No words stand for values of this type.
     """
     origin, inner = get_origin(kind), get_args(kind)
     if origin in (Union, types.UnionType):
@@ -203,7 +203,7 @@ _SIMPLE = {
 
 
 def _either(kinds: list[Values]) -> Values:
-    """Return the values of several types; a word is of the first that takes it."""
+    """Return how words become values of several types: the first type that accepts a word reads it."""
 
     def read(word: str) -> Any:  # noqa: ANN401
         expected = []
@@ -224,10 +224,10 @@ def _choice(word: str, known: tuple[str, ...]) -> str:
 
 
 def _grouped(values: list[Any], of: Values) -> tuple[Any, ...]:
-    """Return values as tuples of equal length, such as places (x, y, z).
+    """Group values into tuples of equal length, such as places (x, y, z).
 
     Raises:
-        ValueError: Their number is none of a whole number of tuples.
+        ValueError: The last tuple is incomplete.
     """
     assert of.joined is not None and isinstance(of.count, int)
     if len(values) % of.count:

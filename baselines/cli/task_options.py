@@ -256,7 +256,7 @@ def _kinds(words: str) -> tuple[RobotKind, ...]:
 
 
 def limit_s(options: TaskOptions) -> float:
-    """Return simulated seconds after which a mission is cut off."""
+    """Return the simulated time after which a mission is cut off, in seconds."""
     return options.ending.time_limit_s if options.time_limit_s is None else options.time_limit_s
 
 

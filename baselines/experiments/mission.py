@@ -228,7 +228,7 @@ def _mean_distance_apart_m(places_m: np.ndarray) -> float:
 
 
 def _clock_s() -> float:
-    """Return seconds on the clock, which stands still while kernels compile."""
+    """Return the time in seconds on a clock that stands still while kernels compile."""
     return time.perf_counter() - compiling_s()
 
 

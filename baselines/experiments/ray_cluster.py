@@ -46,7 +46,7 @@ def check_address(option: str, address: str | None, *others: str) -> None:
 
 
 def ray_of(extra: str) -> Any:  # noqa: ANN401 - a module that may not be there
-    """Return the module, which reports nothing to its makers.
+    """Import and return Ray, with its usage reports switched off.
 
     Raises:
         MissingExtraError: It is not installed; the extra would bring it.

@@ -106,7 +106,7 @@ def _run_in_processes(
 
 
 def _outcome(future: Future[bytes], limit_s: float) -> Any:  # noqa: ANN401 - whatever the work returns
-    """Return what came of a task."""
+    """Return the result of a task, or its failure."""
     try:
         return pickle.loads(future.result())
     except FutureTimeoutError:
@@ -125,17 +125,17 @@ def _ending(code: int) -> str:
 
 
 def failure_of(error: Exception) -> Failure:
-    """Return that of a task that could not be passed on, or not be begun."""
+    """Return the failure of a task that could not be passed on or started."""
     return Failure(_one_line(error), error=error)
 
 
 def late(limit_s: float) -> Failure:
-    """Return that of a task that ran past its limit."""
+    """Return the failure of a task that ran past its limit."""
     return Failure(f"ran past {limit_s:g} s on the clock", late=True)
 
 
 def _attempt_in_time(work: Callable[[Any], Any], task: object, limit_s: float) -> Any:  # noqa: ANN401
-    """Return the result of a task in this process, or why there is none."""
+    """Run a task in this process under its time limit; return its result or its failure."""
     try:
         with _alarm(limit_s):
             return _attempt(work, task)
@@ -173,7 +173,7 @@ def _alarm(limit_s: float) -> Iterator[None]:
 
 
 def _attempt(work: Callable[[Any], Any], task: object) -> Any:  # noqa: ANN401 - the work's
-    """Return the result of a task, or why there is none."""
+    """Run a task; return its result or its failure."""
     try:
         return work(task)
     except (Exception, SystemExit) as error:
@@ -188,7 +188,7 @@ def _one_line(error: BaseException) -> str:
 
 
 def attempt_packed(work: Callable[[Any], Any], task: object, limit_s: float = math.inf) -> bytes:
-    """Return the same in a worker, pickled: what cannot be pickled, or read again, would break a pool."""
+    """Run a task in a worker; return its result or failure pickled, also where that cannot be pickled."""
     outcome = _attempt_in_time(work, task, limit_s)
     try:
         packed = pickle.dumps(outcome)

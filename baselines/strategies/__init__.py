@@ -54,7 +54,7 @@ def make_strategy(name: str) -> Strategy:
 
 
 def scripted_maker(name: str) -> Callable[[], Strategy] | None:
-    """Return what makes the scripted strategy with this name, or None for an unknown name.
+    """Return the factory of the scripted strategy with this name, or None for an unknown name.
 
     Raises:
         SettingError: It names a file of planner weights that cannot be used.
@@ -75,12 +75,12 @@ def resolved(name: str) -> str:
 
 
 def shown_name(name: str) -> str:
-    """Return how people read a strategy's name: of `module:Class` and `file.py:Class` the class."""
+    """Return a strategy's short name: of `module:Class` and `file.py:Class` only the class."""
     return name if name.startswith(_PRETRAINED) else name.rpartition(":")[2]
 
 
 def shown_names(names: Iterable[str]) -> dict[str, str]:
-    """Return how a table calls its strategies: by `shown_name`, in full where two would be called alike."""
+    """Return the strategies' names in a table: by `shown_name`, in full where two short names are equal."""
     short = {name: shown_name(name) for name in names}
     alike = Counter(short.values())
     return {name: shown if alike[shown] == 1 else name for name, shown in short.items()}

@@ -17,7 +17,7 @@ _CLIPPED, _LIGHT_ABOVE = 2.0, 1.3
 
 
 def task_figure(results: Results) -> Figure:
-    """Return a row a task, a column a strategy: the ratio to the reference as colour and number."""
+    """Draw a row per task and a column per strategy: the ratio to the reference as colour and number."""
     reference, measure = results.reference, results.suite.measures[0]
     strategies, tasks = results.ran, results.tasks
     ratios = np.array([[results.ratio_alone(name, task) for name in strategies] for task in tasks])
@@ -40,7 +40,7 @@ def task_figure(results: Results) -> Figure:
 
 
 def fault_figure(times: Times) -> Figure:
-    """Return a panel a team: mission time over that without faults; hollow points are lower bounds."""
+    """Draw a panel per team: mission time over that without faults; hollow points are lower bounds."""
     figure = Figure(figsize=(2.6 + 3.6 * len(times.teams), 5.0), layout="constrained")
     panels = figure.subplots(1, len(times.teams), squeeze=False, sharey=True)[0]
     names = [name for name in CONDITIONS if name != LOST_ISOLATED]

@@ -289,7 +289,7 @@ def _grid(rng: np.random.Generator) -> Grid:
 
 
 def _sensor(rng: np.random.Generator, part: Callable[..., Any]) -> RangeSensor:
-    """Return a sensor with up to some hundred rays."""
+    """Return a sensor with up to a few hundred rays."""
     yaw, pitch = rng.uniform(0.0, 2.0 * math.pi), rng.uniform(0.0, math.pi)
     view = [(yaw, pitch), (2.0 * math.pi, pitch), (yaw, 0.0), (0.0, 0.0)][int(rng.integers(4))]
     step = max(max(view) / rng.integers(1, _MOST_RAYS_ACROSS), 1e-6)

@@ -19,7 +19,7 @@ _SIZES = (b"0", b"-1", b"65536", b"2147483647", b"4294967295", b"999999999999999
 
 
 def absurd_text(data: bytes, rng: np.random.Generator) -> bytes:
-    """Return a number in the text becomes an absurd one."""
+    """Replace a number in the text by an absurd one."""
     numbers = list(re.finditer(rb"-?\d+(\.\d+)?", data[:2048]))
     if not numbers:
         return flipped(data, rng)
@@ -28,7 +28,7 @@ def absurd_text(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 def absurd_binary(data: bytes, rng: np.random.Generator) -> bytes:
-    """Four bytes become a large number, in either order, or a float that is NaN or infinite."""
+    """Replace four bytes by a large number in either byte order, or a float that is NaN or infinite."""
     values = (0xFFFFFFFF, 0x7FFFFFFF, 0x80000000, 1 << 24, 1 << 16, 0x7FC00000, 0x7F000000, 0)
     start = int(rng.integers(max(1, min(len(data), 4096) - 4)))
     word = struct.pack(("<I", ">I")[int(rng.integers(2))], values[int(rng.integers(len(values)))])
@@ -45,7 +45,7 @@ def _archive(members: dict[str, bytes]) -> bytes:
 
 
 def _array(kind: str, shape: tuple[int, int], content: bytes) -> bytes:
-    """Return a NumPy file that says this type and shape, whatever its content."""
+    """Return a NumPy file whose header states this type and shape, whatever its content."""
     head = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117).encode() + b"\n"
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head + content
 
@@ -116,7 +116,7 @@ def repaired_zip(data: bytes, rng: np.random.Generator) -> bytes:
 
 @cache
 def _archive_of_zeros(data: bytes, name: str) -> bytes:
-    """Return an archive in which one array says that it is far larger than its content, which is zeros."""
+    """Return an archive in which one array claims to be far larger than its content, which is zeros."""
     edge = 20_000
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = {each: archive.read(each) for each in archive.namelist()}

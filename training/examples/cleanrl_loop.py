@@ -27,7 +27,7 @@ optimiser = torch.optim.Adam(weights, RATE)
 
 
 def policy(seen, mask):
-    """Return what to draw actions from: none that the mask forbids."""
+    """Return the distribution of actions, without those that the mask forbids."""
     return torch.distributions.Categorical(logits=actor(seen).masked_fill(mask == 0, -1e9))
 
 

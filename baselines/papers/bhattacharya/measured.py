@@ -1,7 +1,7 @@
 """Fig. 4 of Bhattacharya, and tessellations beside SciPy's Dijkstra on the clock.
 
-In fig. 4 an unknown region lies nearer to one of two robots: who gets how much of it? SciPy gets its graph
-ready-made.
+In fig. 4 an unknown region lies nearer to one of two robots; measured is the share that each robot gets.
+SciPy gets its graph ready-made.
 """
 
 from __future__ import annotations
