@@ -19,9 +19,9 @@ from typing import Annotated
 
 import numpy as np
 
-from baselines.cli import bag_replay
+from baselines import bag_replay
+from baselines.bag_replay import BagArgs, is_bag, replay_bag
 from baselines.cli.arguments import parse, run_command
-from baselines.cli.bag_replay import BagArgs, is_bag, replay_bag
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
 from baselines.cli.options import Also, Mark
 from baselines.cli.progress import progress_bar

@@ -68,7 +68,7 @@ def replay_bag(args: BagArgs) -> int:
     if not 0.0 <= args.every_s < np.inf:
         raise SettingError("every_s", args.every_s, "finite seconds ≥ 0")
     reader = BagReader(args.bag, args.topic, args.map_frame, args.frames)
-    rows = list(decisions(reader, args))
+    rows = list(_decisions(reader, args))
     if not rows:
         raise RecordError("bag", str(args.bag), f"a bag in which the poses of {reader.robots} are known")
     spent = [row["ms"] for row in rows[1:]] or [rows[0]["ms"]]
@@ -91,10 +91,10 @@ def replay_bag(args: BagArgs) -> int:
     return 0
 
 
-def decisions(reader: BagReader, args: BagArgs) -> Iterator[dict[str, Any]]:
+def _decisions(reader: BagReader, args: BagArgs) -> Iterator[dict[str, Any]]:
     """Yield the decision of each robot when it is due: figures for JSON."""
     explorer: Explorer | None = None
-    due_s = dict.fromkeys(range(len(reader.robots)), -np.inf)
+    decided_s = dict.fromkeys(range(len(reader.robots)), -np.inf)
     for heard in reader:
         if explorer is None:
             explorer = _explorer(heard, len(reader.robots), args)
@@ -105,8 +105,8 @@ def decisions(reader: BagReader, args: BagArgs) -> Iterator[dict[str, Any]]:
         else:
             explorer.add_scan(heard.pose, heard.points_m, heard.robot)
         for robot in heard.poses:
-            if heard.time_s - due_s[robot] >= args.every_s:
-                due_s[robot] = heard.time_s
+            if heard.time_s - decided_s[robot] >= args.every_s:
+                decided_s[robot] = heard.time_s
                 row = _decision(explorer, heard, robot)
                 if row is not None:
                     yield row
@@ -143,17 +143,7 @@ def _decision(explorer: Explorer, heard: MapHeard | ScanHeard, robot: int) -> di
 
 def _shown(row: dict[str, Any]) -> list[Any]:
     """Return a row of the table."""
-    at = "({:.2f}, {:.2f}, {:.2f})".format(*row["pose"][:3])
-    if row["goal"] is None:
-        return [row["time_s"], row["robot"], at, f"none: {row['why']}", None, None, None, row["ms"]]
-    goal = "({:.2f}, {:.2f}, {:.2f})".format(*row["goal"][:3])
-    return [
-        row["time_s"],
-        row["robot"],
-        at,
-        goal,
-        row["bits"],
-        row["path_m"],
-        row["seconds"],
-        row["ms"],
-    ]
+    place = "({:.2f}, {:.2f}, {:.2f})".format
+    goal = f"none: {row['why']}" if row["goal"] is None else place(*row["goal"][:3])
+    figures = (row.get(name) for name in ("bits", "path_m", "seconds", "ms"))
+    return [row["time_s"], row["robot"], place(*row["pose"][:3]), goal, *figures]
