@@ -8,6 +8,7 @@ import time
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -17,6 +18,7 @@ import numpy as np
 from baselines.cli.arguments import make_folder, print_json
 from baselines.cli.progress import named, print_table
 from baselines.strategies import shown_name
+from entropy_explore_env.belief.belief_map import Map
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.interop.bag_writer import BagWriter
@@ -81,16 +83,21 @@ class Wanted:
         """
         if self.outputs.truth and self.out is None:
             raise SettingError("truth", True, "--out beside it")
-        mp4, rerun = self.outputs.mp4, self.outputs.rerun
-        needed = (("av", "av", mp4, "viewer"), ("rerun-sdk", "rerun", rerun, "viewer"))
-        needed = (*needed, ("rosbags", "rosbags", self.outputs.bag, "ros"))
+        mp4, rerun, bag = self.outputs.mp4, self.outputs.rerun, self.outputs.bag
+        needed = (
+            ("av", "av", mp4, "viewer"),
+            ("rerun-sdk", "rerun", rerun, "viewer"),
+            ("rosbags", "rosbags", bag, "ros"),
+        )
         for package, module, file, extra in needed:
             if file is not None and importlib.util.find_spec(module) is None:
                 raise MissingExtraError(package, extra)
-        if self.outputs.bag is not None and self.outputs.bag.exists():
-            raise SettingError("bag", str(self.outputs.bag), "a folder that does not exist yet")
+        if bag is not None and bag.exists():
+            raise SettingError("bag", str(bag), "a folder that does not exist yet")
         if self.out is not None:
             make_folder("out", self.out)
+        if bag is not None:
+            make_folder("bag", bag.parent)
         files = {"gif": self.outputs.gif, "mp4": mp4, "record": self.record, "rerun": rerun}
         for option, file in files.items():
             if file is not None:
@@ -114,8 +121,7 @@ class MissionLog:
             "mp4": _VIDEO_PICTURES if wanted.outputs.mp4 else 0,
         }
         self._films = {kind: Film(most) for kind, most in films.items() if most}
-        self._rerun: RerunView | None = None
-        self._bag: BagWriter | None = None
+        self._followers: list[RerunView | BagWriter] = []
         self._stack = ExitStack()
         self._started = False
 
@@ -129,11 +135,10 @@ class MissionLog:
 
     def _start(self, env: EntropyExploreEnv) -> None:
         self.recorder, self.commands = Recorder(env.missions), CommandRecorder(env.missions)
-        if self._wanted.outputs.rerun is not None:
-            self._rerun = self._stack.enter_context(RerunView(env.missions, self._wanted.outputs.rerun))
-        if self._wanted.outputs.bag is not None:
-            self._wanted.outputs.bag.parent.mkdir(parents=True, exist_ok=True)
-            self._bag = self._stack.enter_context(BagWriter(env.missions, self._wanted.outputs.bag))
+        outputs = self._wanted.outputs
+        for kind, path in ((RerunView, outputs.rerun), (BagWriter, outputs.bag)):
+            if path is not None:
+                self._followers.append(self._stack.enter_context(kind(env.missions, path)))
         self._started = True
 
     def command(self, actions: Mapping[str, Any]) -> None:
@@ -146,10 +151,8 @@ class MissionLog:
             self._start(env)
         self.recorder.note()
         self.commands.note()
-        if self._rerun is not None:
-            self._rerun.note()
-        if self._bag is not None:
-            self._bag.note()
+        for follower in self._followers:
+            follower.note()
         if not self._films:
             return
         self._painter.watch(env.missions)
@@ -164,7 +167,7 @@ class MissionLog:
         """Sum the mission up and write the files, each whole or not at all.
 
         Args:
-            strategy: Who chose the commands.
+            strategy: Name of the strategy that chose the commands.
             **more: Further figures.
 
         Returns:
@@ -195,21 +198,22 @@ class MissionLog:
             if file is not None:
                 save_record(self.commands.record(figures["strategy"], self._results()), file)
                 written.append(file)
-        if self._rerun is not None:
-            self._rerun.finish()
-            written.append(self._rerun.path)
-        if self._bag is not None:
-            self._bag.finish()
-            written.append(self._bag.path)
+        for follower in self._followers:
+            follower.finish()
+            written.append(follower.path)
         return written
+
+    @cached_property
+    def _team_map(self) -> Map:
+        """The team's map at the end of the mission."""
+        return joint_map(self.recorder.missions)
 
     def _results(self) -> dict[str, np.ndarray]:
         """Return the arrays that a record keeps for readers: poses over time, and the team's map."""
         recorder = self.recorder
         arrays = [recorder.time_s, recorder.poses]
         if recorder.missions.grid.voxels <= MOST_MAP_VOXELS:
-            team_map = joint_map(recorder.missions)
-            arrays += [team_map.mean, team_map.precision]
+            arrays += [self._team_map.mean, self._team_map.precision]
         return dict(zip(RESULTS, arrays, strict=False))
 
     def _write_folder(self, folder: Path, figures: dict[str, Any]) -> list[Path]:
@@ -229,9 +233,9 @@ class MissionLog:
         strategy = shown_name(figures["strategy"])
         picture = mission_picture(recorder, named(figures), strategy, self._wanted.outputs.truth)
         write_atomically(folder / "mission.png", picture)
-        team_map = joint_map(recorder.missions)
-        name = "map.yaml" if team_map.grid.flat else "map.npz"
-        return [folder / "mission.json", folder / "mission.png", *save_map(team_map, folder / name)]
+        name = "map.yaml" if self._team_map.grid.flat else "map.npz"
+        maps = save_map(self._team_map, folder / name)
+        return [folder / "mission.json", folder / "mission.png", *maps]
 
 
 def show_results(env: EntropyExploreEnv, figures: dict[str, Any], written: list[Path], as_json: bool) -> None:
