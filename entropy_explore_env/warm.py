@@ -23,7 +23,7 @@ from entropy_explore_env.command import LineParser
 from entropy_explore_env.compilation.announcement import compiled_kernels, short_path
 from entropy_explore_env.compilation.folder import kernel_folder
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import SettingError, one_of
+from entropy_explore_env.errors import SettingError, counted, one_of
 from entropy_explore_env.settings.scenarios import SCENARIOS
 
 _MAX_PROCESSES = 256
@@ -52,12 +52,15 @@ def main(words: Sequence[str]) -> int:
         done.append(warmed)
         if warmed.compiled:
             print(
-                f"{warmed.scenario}: compiled {_kernels(warmed.compiled)}, {warmed.seconds:.1f} s", flush=True
+                f"{warmed.scenario}: compiled {counted(warmed.compiled, 'kernel')}, {warmed.seconds:.1f} s",
+                flush=True,
             )
     compiled = sum(warmed.compiled for warmed in done)
     if compiled:
         taken = time.perf_counter() - began
-        print(f"Compiled {_kernels(compiled)} in {taken:.1f} s; they are kept in {short_path(folder)}.")
+        print(
+            f"Compiled {counted(compiled, 'kernel')} in {taken:.1f} s; they are kept in {short_path(folder)}."
+        )
     else:
         print(f"Nothing left to compile: all kernels are in {short_path(folder)}.")
     return 0
@@ -110,7 +113,3 @@ def warm(name: str) -> Warmed:
     env.step({agent: env.action_space(agent).sample() for agent in env.agents})
     env.close()
     return Warmed(name, len(compiled_kernels()) - before, time.perf_counter() - began)
-
-
-def _kernels(count: int) -> str:
-    return "1 kernel" if count == 1 else f"{count} kernels"

@@ -12,6 +12,7 @@ from typing import Any
 
 from baselines.strategies import shown_name
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import counted
 from entropy_explore_env.reports.painting import remaining_share
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario
@@ -159,7 +160,7 @@ def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario
     from rich.console import Console
     from rich.table import Table
 
-    team = f"{figures['robots']} robot" + ("s" if figures["robots"] > 1 else "")
+    team = counted(figures["robots"], "robot")
     print(f"{named(figures)}, {shown_name(figures['strategy'])}, {team}, seed {figures['seed']}")
     table = Table(show_header=False)
     table.add_column(style="dim")

@@ -20,6 +20,7 @@ from baselines.suites.faults import CONDITIONS, LOST_ISOLATED, NOTHING_FAILS, Ti
 from baselines.suites.figures import fault_figure, task_figure
 from baselines.suites.results import Results, Row, failed_rows, overall_rows, results_of, task_rows
 from baselines.suites.suite import Measure, Task
+from entropy_explore_env.errors import counted
 
 _TEMPLATES = Path(__file__).parent
 
@@ -183,7 +184,7 @@ def about(task: Task) -> str:
     if files[0].is_file() and len(task.places) == 1:
         names = [f"`{name}`" for name in dict.fromkeys(file.name for file in files)]
         worlds = f"world file{'s' if len(names) > 1 else ''} {', '.join(names)}"
-    team = f"{scenario.robots} {kind} robot" + ("s" if scenario.robots > 1 else "")
+    team = counted(scenario.robots, f"{kind} robot")
     sensor = scenario.sensor
     if math.isfinite(sensor.scan_every_m):
         team += f" that scans {sensor.rays} rays of {sensor.max_range_m:g} m every {sensor.scan_every_m:g} m"

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 from baselines.experiments.mission import SuiteMission, Surroundings
 from baselines.experiments.rows import Record
 from baselines.experiments.trials import Cell, CellTrial
+from entropy_explore_env.errors import counted
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario
 
@@ -205,4 +206,4 @@ def task_in(name: str, scenario: Scenario, missions: int, **settings: Any) -> Ta
 
 def team_name(name: str, robots: int) -> str:
     """Return a task's name: the scenario and the team size."""
-    return f"{name}, {robots} robot" + ("s" if robots > 1 else "")
+    return f"{name}, {counted(robots, 'robot')}"

@@ -12,6 +12,7 @@ from baselines.experiments.rows import Record
 from baselines.experiments.statistics import mean_interval
 from baselines.papers.rocha04.claims import PAPER_T_MISSION_S
 from baselines.papers.rocha04.sweep import BURSTS, I_MINS, STANDARD, TEAMS, alternative_id, team_id
+from entropy_explore_env.errors import counted
 
 _ALTERNATIVES = {
     "random": ("random walk", "x", "0.4", -0.1),
@@ -58,7 +59,7 @@ def figure_4(records: Records) -> Figure:
     for robots in (1, *TEAMS):
         record = _middle(records[team_id(robots, *STANDARD)])
         bits = np.asarray(record["series"]["entropy_bits"]) / 1000
-        team = "1 robot" if robots == 1 else f"{robots} robots"
+        team = counted(robots, "robot")
         label = f"{team}, {record['measurements'] / robots:,.0f} own measurements each"
         axes.plot(record["series"]["time_s"], bits, color=COLOURS[robots - 1], label=label)
     axes.legend(frameon=False)
