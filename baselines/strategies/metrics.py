@@ -115,7 +115,7 @@ class ExplorationConfig:
         """Check every field."""
         if not isinstance(self.metric, Value):
             raise SettingError("ExplorationConfig.metric", self.metric, "a Metric, Nearest or Coordinated")
-        check_choice(self, "allocation", Allocation)
+        check_choice(self, "allocation")
         check_kind(self, "promises", bool)
         check_kind(self, "frontiers", FrontierConfig)
         check_kind(self, "once", bool)

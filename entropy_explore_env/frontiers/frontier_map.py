@@ -57,8 +57,8 @@ class FrontierConfig:
         """Check every field."""
         if self.spacing_m is not None:
             check_positive(self, "spacing_m")
-        check_choice(self, "visibility", Visibility)
-        check_choice(self, "unexplored_ground", UnexploredGround)
+        check_choice(self, "visibility")
+        check_choice(self, "unexplored_ground")
         if self.gamma is not None:
             check(self, "gamma", "None, or a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
 

@@ -33,8 +33,8 @@ class Action:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check_choice(self, "kind", Literal["continuous", "discrete", "candidates"])
-        check_choice(self, "moves", Literal["all", "axes"])
+        check_choice(self, "kind")
+        check_choice(self, "moves")
         check_count(self, "yaws", 1, 360)
         check_count(self, "pitches", 1, 90)
         check_count(self, "candidates", 1, MAX_CANDIDATES)

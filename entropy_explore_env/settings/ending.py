@@ -8,17 +8,10 @@ from typing import Literal
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.grid import MAX_VOXELS
-from entropy_explore_env.settings.validation import (
-    check,
-    check_choice,
-    check_count,
-    check_kind,
-    check_within,
-)
+from entropy_explore_env.settings.validation import check, check_choice, check_count, check_kind, check_within
 
 BITS_OF_UNIT_GAUSSIAN = 0.5 * math.log2(2.0 * math.pi * math.e)
 """Differential entropy of N(0, 1) in bits: Rocha04, eq. 15 at σ = 1."""
-
 
 SIGMA_PRIOR = 30.0
 """Standard deviation of the coverage of a voxel that was never measured (Rocha04, table 2)."""
@@ -77,7 +70,7 @@ class Ending:
         """Check every field."""
         allowed = f"a number from 1e-4 to below {SIGMA_PRIOR:g}, the σ of what was never measured"
         check(self, "sigma_end", allowed, lambda v: 1e-4 <= v < SIGMA_PRIOR)
-        check_choice(self, "termination", Literal["any", "all", "shared"])
+        check_choice(self, "termination")
         if self.seen_share is not None:
             check(self, "seen_share", "None, or a number above 0 up to 1", lambda v: 0 < v <= 1)
         if self.unseen_free_voxels is not None:

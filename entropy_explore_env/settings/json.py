@@ -7,13 +7,13 @@ import math
 import types
 import typing
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
 
 from entropy_explore_env.errors import SettingError, did_you_mean
 from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.validation import annotations_of
 
 Settings = TypeVar("Settings")
 INFINITY = "inf"
@@ -54,17 +54,36 @@ def dataclass_of(kind: type[Settings], settings: Any, name: str = "settings") ->
     Raises:
         SettingError: See `scenario_of`.
     """
-    return _decoded(kind, settings, name)
+    annotations = annotations_of(kind)
+    if not isinstance(settings, Mapping):
+        raise SettingError(name, settings, f"an object with the fields of {kind.__name__}")
+    for field, given in settings.items():
+        if field not in annotations:
+            raise SettingError(
+                f"{kind.__name__}.{field}",
+                given,
+                "one of the fields " + ", ".join(annotations) + did_you_mean(field, annotations),
+            )
+    for each in dataclasses.fields(kind):  # type: ignore[arg-type]
+        needed = each.default is dataclasses.MISSING and each.default_factory is dataclasses.MISSING
+        if needed and each.name not in settings:
+            raise SettingError(f"{kind.__name__}.{each.name}", "missing", "a value")
+    return kind(
+        **{
+            field: _decoded(annotations[field], given, f"{kind.__name__}.{field}")
+            for field, given in settings.items()
+        }
+    )
 
 
-def _decoded(hint: Any, value: Any, name: str) -> Any:  # noqa: ANN401 - whatever a setting may be
-    """Return the value of a setting of annotation `hint`; the settings check themselves what it is."""
-    if typing.get_origin(hint) in (typing.Union, types.UnionType):
-        return _decoded(_member(hint, value), value, name)
-    if dataclasses.is_dataclass(hint):
-        return _part(typing.cast(type, hint), value, name)
-    if typing.get_origin(hint) is tuple and isinstance(value, list):
-        kinds = typing.get_args(hint)
+def _decoded(annotation: Any, value: Any, name: str) -> Any:  # noqa: ANN401 - whatever a setting may be
+    """Return the value of a setting with an annotation; the settings check themselves what it is."""
+    if typing.get_origin(annotation) in (typing.Union, types.UnionType):
+        return _decoded(_member(annotation, value), value, name)
+    if dataclasses.is_dataclass(annotation):
+        return dataclass_of(typing.cast(type, annotation), value, name)
+    if typing.get_origin(annotation) is tuple and isinstance(value, list):
+        kinds = typing.get_args(annotation)
         repeated = len(kinds) == 2 and kinds[1] is Ellipsis
         if not repeated and len(kinds) != len(value):
             raise SettingError(name, value, f"a list of {len(kinds)}")
@@ -72,40 +91,15 @@ def _decoded(hint: Any, value: Any, name: str) -> Any:  # noqa: ANN401 - whateve
             _decoded(kinds[0] if repeated else kinds[place], each, f"{name}[{place}]")
             for place, each in enumerate(value)
         )
-    return math.inf if hint is float and value == INFINITY else value
+    return math.inf if annotation is float and value == INFINITY else value
 
 
-def _member(hint: Any, value: Any) -> Any:  # noqa: ANN401 - of a union: the kind that the value is of
-    for member in typing.get_args(hint):
-        is_part, is_tuple = dataclasses.is_dataclass(member), typing.get_origin(member) is tuple
-        if isinstance(value, Mapping) if is_part else isinstance(value, list) if is_tuple else False:
+def _member(union: Any, value: Any) -> Any:  # noqa: ANN401 - an annotation
+    """Return the member of a union of which the value is; None where it needs no decoding."""
+    members = typing.get_args(union)
+    for member in members:
+        if dataclasses.is_dataclass(member) and isinstance(value, Mapping):
             return member
-    return float if value == INFINITY and float in typing.get_args(hint) else None
-
-
-def _part(kind: type, value: Any, name: str) -> Any:  # noqa: ANN401 - an object of the kind
-    """Return a dataclass from an object of its fields."""
-    hints = _hints(kind)
-    if not isinstance(value, Mapping):
-        raise SettingError(name, value, f"an object with the fields of {kind.__name__}")
-    for field, given in value.items():
-        if field not in hints:
-            raise SettingError(
-                f"{kind.__name__}.{field}",
-                given,
-                "one of the fields " + ", ".join(hints) + did_you_mean(field, hints),
-            )
-    for field in dataclasses.fields(kind):
-        needed = field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING
-        if needed and field.name not in value:
-            raise SettingError(f"{kind.__name__}.{field.name}", "missing", "a value")
-    return kind(
-        **{field: _decoded(hints[field], given, f"{kind.__name__}.{field}") for field, given in value.items()}
-    )
-
-
-@lru_cache(maxsize=32)
-def _hints(kind: type) -> dict[str, Any]:
-    """Field name → its annotation, evaluated."""
-    hints = typing.get_type_hints(kind)
-    return {field.name: hints[field.name] for field in dataclasses.fields(kind)}
+        if typing.get_origin(member) is tuple and isinstance(value, list):
+            return member
+    return float if value == INFINITY and float in members else None

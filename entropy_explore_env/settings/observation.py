@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
 from entropy_explore_env.errors import SettingError
@@ -53,24 +53,13 @@ class Observation:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        for name in (
-            "panorama",
-            "self_state",
-            "drive",
-            "team",
-            "patch",
-            "overview",
-            "candidates",
-            "overlaps",
-            "action_mask",
-            "flat",
-            "while_busy",
-        ):
-            check_kind(self, name, bool)
+        for each in fields(self):
+            if isinstance(each.default, bool):
+                check_kind(self, each.name, bool)
         if self.panorama_yaws is not None:
             check_count(self, "panorama_yaws", 1, 360)
         check_count(self, "panorama_pitches", 1, 90)
-        check_choice(self, "panorama_utility", Literal["bits", "log2"])
+        check_choice(self, "panorama_utility")
         check_counts(self, "patch_shape", 1, 255)
         if not all(n % 2 for n in self.patch_shape):
             raise SettingError("Observation.patch_shape", self.patch_shape, "odd numbers only")

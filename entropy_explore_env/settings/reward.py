@@ -24,5 +24,5 @@ class Reward:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check_choice(self, "kind", Literal["individual", "team"])
+        check_choice(self, "kind")
         check_within(self, "cost_per_s", least=0, most=1e6)

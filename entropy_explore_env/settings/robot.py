@@ -65,8 +65,8 @@ class Robot:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check_choice(self, "motion", Literal["free", "planar"])
-        check_choice(self, "navigator", Literal["straight", "planned"])
+        check_choice(self, "motion")
+        check_choice(self, "navigator")
         check(self, "unknown_cost", "a number from 1 to 1e6", lambda v: 1.0 <= v <= 1e6)
         check_within(self, "reach_m", least=1e-6, most=1e6, inf=True)
         check_within(self, "max_speed_m_s", least=1e-4, most=1e4)
@@ -76,7 +76,7 @@ class Robot:
         check_kind(self, "tilts", bool)
         if self.above_ground_m is not None:
             check(self, "above_ground_m", "None, or a number from 1e-6 to 1e6", lambda v: 1e-6 <= v <= 1e6)
-        check_choice(self, "when_blocked", Literal["wander", "wait"])
+        check_choice(self, "when_blocked")
         check_within(self, "blocked_wait_s", least=1e-4, most=1e5)
         periodic = is_number(self.redecide) and MIN_REDECIDE_S <= self.redecide < math.inf
         if not periodic and not (isinstance(self.redecide, str) and self.redecide in _REDECIDE):

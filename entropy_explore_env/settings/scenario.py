@@ -100,7 +100,7 @@ class Scenario:
             object.__setattr__(self, "sensor", _level(self.sensor))
             extra_kinds = tuple(RobotKind(kind.robot, _level(kind.sensor)) for kind in self.extra_kinds)
             object.__setattr__(self, "extra_kinds", extra_kinds)
-        check_choice(self, "split", Literal["train", "validation", "test"])
+        check_choice(self, "split")
         check_count(self, "robots", 1, 1000)
         check_within(self, "start_radius_m", least=1e-6, most=1e6, inf=True)
         if self.decision_period_s is not None:

@@ -6,8 +6,9 @@ import dataclasses
 import math
 import os
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeGuard, get_args
+from typing import Any, TypeGuard, get_args, get_type_hints
 
 import numpy as np
 
@@ -110,11 +111,18 @@ def check_counts(settings: object, name: str, least: int, most: int) -> None:
         raise SettingError(f"{type(settings).__name__}.{name}", value, allowed)
 
 
-def check_choice(settings: object, name: str, choices: object) -> None:
-    """Check that the field is one of the values of a Literal."""
-    value, members = getattr(settings, name), get_args(choices)
+def check_choice(settings: object, name: str) -> None:
+    """Check that the field is one of the values of the Literal that it is annotated with."""
+    value, members = getattr(settings, name), get_args(annotations_of(type(settings))[name])
     if not isinstance(value, str) or value not in members:
         raise SettingError(f"{type(settings).__name__}.{name}", value, one_of(value, members))
+
+
+@lru_cache(maxsize=64)
+def annotations_of(kind: type) -> dict[str, Any]:
+    """Field name of a dataclass → its annotation, evaluated."""
+    hints = get_type_hints(kind)
+    return {field.name: hints[field.name] for field in dataclasses.fields(kind)}
 
 
 def check_kind(settings: object, name: str, kind: type) -> None:

@@ -12,14 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.settings import json as module
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.settings.json import (
-    dataclass_of,
-    scenario_of,
-    settings_of,
-)
+from entropy_explore_env.settings.json import dataclass_of, scenario_of, settings_of
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
@@ -138,16 +133,15 @@ def test_what_is_no_object_is_refused(settings):
         scenario_of(settings)
 
 
-def test_lists_of_parts_come_back_as_tuples():
+@dataclasses.dataclass(frozen=True)
+class Team:
     """Settings that are a part, or one part a robot."""
 
-    @dataclasses.dataclass(frozen=True)
-    class Team:
-        robots: Grid | tuple[Grid, ...]
-        most: float | None = None
+    robots: Grid | tuple[Grid, ...]
+    most: float | None = None
 
-    module._hints.cache_clear()
-    Team.__annotations__ = {"robots": Grid | tuple[Grid, ...], "most": float | None}
+
+def test_lists_of_parts_come_back_as_tuples():
     two = Team((Grid((7, 11, 5), 0.5), Grid((1, 2, 3), 0.1)), math.inf)
     for team in (two, Team(Grid((7, 11, 5), 0.5))):
         assert dataclass_of(Team, json.loads(json.dumps(settings_of(team))), "team") == team

@@ -59,7 +59,7 @@ class NextBestViewConfig:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check_choice(self, "measure", Measure)
+        check_choice(self, "measure")
         check_kind(self, "extrapolated", bool)
         check_count(self, "poses", 1, 100_000)
         check_within(self, "distance_weight", "error_weight", "interest_decay", least=0.0, most=1e6)
