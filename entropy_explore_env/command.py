@@ -26,7 +26,7 @@ READ_MEMORY_VARIABLE = "ENTROPY_EXPLORE_READ_MEMORY_MIB"
 
 
 def allow_read_memory(read_memory_mib: float | None) -> None:
-    """Let this process, and those that it starts, take so much memory to read a world file; None = as it was.
+    """Let this process, and those it starts, take this much memory to read a world file; None = as before.
 
     Raises:
         SettingError: It is no finite number > 0.

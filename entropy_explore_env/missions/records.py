@@ -40,7 +40,7 @@ class MissionEnd(enum.Enum):
     CYCLES_UP = "The number of steps reached its limit."
     SEEN = "The team has seen as much of the world as the mission asks for."
     STOPPED = "All robots have stopped for good."
-    EXHAUSTED = "All that robots can drive up to is known to each, and scans long showed nothing new beyond."
+    EXHAUSTED = "Every robot knows all that robots can drive up to, and scans have long shown nothing new."
 
     @property
     def code(self) -> int:
@@ -79,33 +79,24 @@ MISSION = ranged_type(
         ("cycles", "i8", Values(0, "cycles")),  # steps so far
         ("end", "i8", Values(0, len(MissionEnd) - 1)),  # code of a MissionEnd
         ("enqueued", "i8", COUNT),  # delayed messages sent so far
-        ("reached_s", "f8", PAST_OR_NEVER, (4,)),  # when the best map had lost each of PROGRESS; -1 = not yet
+        # when the best map had lost each of PROGRESS; -1 = not yet
+        ("reached_s", "f8", PAST_OR_NEVER, (len(PROGRESS),)),
         # of the joint map, where the truth is tracked
         ("joint_bits", "f8", SIGNED),  # its entropy
         ("explored", "i8", _VOXELS),  # voxels measured at all
         ("explored_visible", "i8", _VOXELS),  # of those that can be seen from where robots can be
-        (
-            "error",
-            "f8",
-            Values(-ROUNDING, "voxels"),
-        ),  # sum of |expected - true coverage| over explored voxels
+        ("error", "f8", Values(-ROUNDING, "voxels")),  # sum of |expected - true coverage| over explored ones
         ("wrong", "i8", _VOXELS),  # explored voxels on the wrong side of ½
         ("visible", "i8", _VOXELS),  # voxels that can be seen from where robots can be
         ("visible_free", "i8", _VOXELS),  # of those that are free
         ("explored_free", "i8", _VOXELS),  # of those that were measured
-        (
-            "seen_s",
-            "f8",
-            PAST_OR_NEVER,
-            (5,),
-        ),  # when the share of SEEN_MARKS of what is visible was explored; -1 = not yet
-        ("seen_m", "f8", Values(-ROUNDING, MOST, -1.0), (5,)),  # what the team had driven then; -1 likewise
-        (
-            "explored_end",
-            "i8",
-            Values(0, MAX_VOXELS),
-        ),  # this many explored visible voxels end the mission, if so it ends,
-        ("explored_free_end", "i8", Values(-MAX_VOXELS, "voxels")),  # and this many free ones
+        # when each share of SEEN_MARKS of what is visible was explored, and what the team had driven then;
+        # -1 = not yet
+        ("seen_s", "f8", PAST_OR_NEVER, (len(SEEN_MARKS),)),
+        ("seen_m", "f8", Values(-ROUNDING, MOST, -1.0), (len(SEEN_MARKS),)),
+        # explored visible voxels, and free ones among them, that end a mission which ends by what was seen
+        ("explored_end", "i8", Values(0, MAX_VOXELS)),
+        ("explored_free_end", "i8", Values(-MAX_VOXELS, "voxels")),
         # since a scan showed something new, or since it was asked what is left:
         ("idle_scans", "i8", COUNT),  # the team's scans
         ("idle_from_m", "f8", Values(-ROUNDING, MOST)),  # what the team had driven then
@@ -118,45 +109,28 @@ ROBOT = ranged_type(
         ("deciding", "?", FLAG),  # whether it chooses a viewpoint in the next step
         ("under_way", "?", FLAG),  # whether it does so while it drives on
         ("path_blocked", "?", FLAG),  # whether a scan under way showed that the rest of its path is blocked
-        (
-            "waiting",
-            "?",
-            FLAG,
-        ),  # whether it stands still, or stood still until it decides, since a blocked drive
+        # whether it stands still, or stood still until it decides, since a blocked drive
+        ("waiting", "?", FLAG),
         ("origin", "f8", POSE, (5,)),  # pose at which the latest drive began
         ("goal", "f8", POSE, (5,)),  # pose at which it ends, or ended
         ("target", "f8", FAR_POSE, (5,)),  # viewpoint that was chosen, whether or not the drive ends there
         ("scan_pose", "f8", POSE, (5,)),  # pose of the latest scan
-        (
-            "path",
-            "f8",
-            FAR_PLACE,
-            (WAYPOINTS, 3),
-        ),  # points to which it meant to drive straight, one after the other
+        # points to which it meant to drive straight, one after the other
+        ("path", "f8", FAR_PLACE, (WAYPOINTS, 3)),
         ("waypoints", "i8", Values(0, WAYPOINTS)),  # how many there are; 0 = straight to the target
-        (
-            "path_end",
-            "i8",
-            Values(0, len(MoveEnd) - 1),
-        ),  # code of a MoveEnd: how a planned drive ends if nothing stops it
+        # code of a MoveEnd: how a planned drive ends if nothing stops it
+        ("path_end", "i8", Values(0, len(MoveEnd) - 1)),
         ("corners", "i8", Values(0, WAYPOINTS)),  # how many of the points the drive passes before its goal
         ("path_m", "f8", POSITIVE),  # length of the drive
         ("depart_s", "f8", PAST),  # start of the drive
         ("lead_s", "f8", SIGNED),  # of its SpeedProfile
         ("scan_lead_m", "f8", POSITIVE),  # metres from its latest scan to the start of the drive
         ("decided_s", "f8", PAST),  # when it decided last, whether or not that changed the drive
-        (
-            "redecide_s",
-            "f8",
-            Values(0.0, "soon_s", math.inf),
-        ),  # when it decides under way, or when it could since; inf = not before it stops
+        # when it decides under way, or when it could since; inf = not before it stops
+        ("redecide_s", "f8", Values(0.0, "soon_s", math.inf)),
         ("next_scan_s", "f8", Values(0.0, "next_s")),  # when it scans next: under way, or at `ready_s`
         ("scans_under_way", "i8", COUNT),  # that it took in this drive
-        (
-            "ready_s",
-            "f8",
-            Values(0.0, "next_s"),
-        ),  # end of the scan after it; of the wait, while it is waiting
+        ("ready_s", "f8", Values(0.0, "next_s")),  # end of the scan after it; of the wait, while it waits
         ("move_end", "i8", Values(0, len(MoveEnd) - 1)),  # code of a MoveEnd of the latest drive
         ("depth_m", "f8", Values(0.0, "longest_m")),  # r̂ of the latest scan (RochaMI, eq. 4)
         ("half_angle_rad", "f8", Values(0.0, math.pi + ROUNDING)),  # α̂ of it
@@ -201,11 +175,7 @@ FAULT = ranged_type(
         # counted from the mission's start
         ("blind_scans", "i8", COUNT),
         ("rays_lost", "i8", COUNT),
-        (
-            "messages_silenced",
-            "i8",
-            COUNT,
-        ),  # per teammate that a silent radio did not reach, and those not heard
+        ("messages_silenced", "i8", COUNT),  # per teammate not reached by a silent radio, and those not heard
         ("messages_garbled", "i8", COUNT),  # that arrived so
         ("messages_repeated", "i8", COUNT),  # that arrived twice
         ("messages_late", "i8", COUNT),  # that were sent late
@@ -219,11 +189,8 @@ HEARD = ranged_type(
     [
         ("heard_s", "f8", PAST_OR_NEVER),  # when the last message that arrived was sent; -1 = none did
         ("pose", "f8", FAR_POSE, (5,)),  # where its sender was
-        (
-            "announced_s",
-            "f8",
-            PAST_OR_NEVER,
-        ),  # when the last announcement that arrived was sent; -1 = none did
+        # when the last announcement that arrived was sent; -1 = none did
+        ("announced_s", "f8", PAST_OR_NEVER),
         ("announced", "f8", Values("announced_low", "announced_high"), (7,)),  # its viewpoint, r̂ and α̂
     ],
 )
@@ -243,11 +210,8 @@ MESSAGE = ranged_type(
 PHASES = ranged_type(
     [
         ("broadcasts", "i8", COUNT),  # how often the robots have broadcast
-        (
-            "collecting",
-            "i8",
-            FLAG,
-        ),  # the buffer, 0 or 1, that takes in new batches; the other one is broadcast
+        # the buffer, 0 or 1, that takes in new batches; the other one is broadcast
+        ("collecting", "i8", FLAG),
     ],
 )
 

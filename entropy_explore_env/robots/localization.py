@@ -52,6 +52,9 @@ LOCALIZATION_PARAMS = record_type(
 )
 """How a robot localises itself, in the units of `settings.localization`, standard deviations squared."""
 
+COVARIANCE_NUMBERS = 10
+"""Different numbers of a covariance of four."""
+
 ESTIMATE = ranged_type(
     [
         ("place", "f8", PLACE, (3,)),  # where the robot truly was at the latest event
@@ -59,25 +62,13 @@ ESTIMATE = ranged_type(
         ("driven_m", "f8", Values(-1.0, MOST)),  # what it had driven by then
         ("error", "f8", Values("error_low", "error_high"), (4,)),  # estimate less truth: x, y, z, yaw
         ("covariance", "f8", SPREAD, (4, 4)),  # of x, y, z, yaw, as the robot holds it to be
-        (
-            "packed",
-            "f8",
-            SPREAD,
-            (10,),
-        ),  # the covariance at its latest scan, as batches of measurements carry it
-        (
-            "scan_pose",
-            "f8",
-            POSE,
-            (5,),
-        ),  # where it believes to have taken its latest scan: x, y, z, yaw, pitch
-        ("drift_rng", "u8", None, (1,)),  # random state of drift
-        (
-            "sighting_rng",
-            "u8",
-            None,
-            (1,),
-        ),  # of errors of sightings: fiducials do not change the drift
+        # the covariance at its latest scan, as batches of measurements carry it
+        ("packed", "f8", SPREAD, (COVARIANCE_NUMBERS,)),
+        # where it believes to have taken its latest scan: x, y, z, yaw, pitch
+        ("scan_pose", "f8", POSE, (5,)),
+        # random states of drift, and of errors of sightings, so that fiducials do not change the drift
+        ("drift_rng", "u8", None, (1,)),
+        ("sighting_rng", "u8", None, (1,)),
         # counted from the mission's start
         ("sightings", "i8", COUNT),
         ("squared_m2", "f8", Values(0.0, HUGE)),  # squared error of the place, summed over scans
@@ -85,9 +76,6 @@ ESTIMATE = ranged_type(
     ],
 )
 """What a robot believes of its pose, and how wrong that is: the robot itself sees no error."""
-
-COVARIANCE_NUMBERS = 10
-"""Different numbers of a covariance of four."""
 
 
 @lean_kernel

@@ -1,8 +1,7 @@
 """Structured types whose fields say which values they hold in a mission, so that other ones are refused.
 
-Kernels take a state as it is: a count that is too large leads them beyond their arrays, and a number that is
-none leads to observations that are none. The ranges prevent that; they do not prove that a
-mission came there.
+Kernels take a state as it is: a count that is too large leads them beyond their arrays, and NaN in it leads
+to NaN in observations. The ranges prevent that; they do not prove that a mission came there.
 """
 
 from __future__ import annotations
@@ -45,10 +44,10 @@ PAST = Values(0.0, "time_s")
 PAST_OR_NEVER = Values(0.0, "time_s", -1.0)
 PLACE = Values("place_low", "place_high")
 PLACE_OR_ZERO = Values("zero_place_low", "zero_place_high")
-"""Of what is not always used: free places hold zeros, wherever the workspace is."""
+"""Of records that are not always in use: free ones hold zeros, wherever the workspace is."""
 POSE = Values("pose_low", "pose_high")
 FAR_PLACE = Values("far_place_low", "far_place_high")
-"""No farther beyond the workspace than a viewpoint may be; zeros too."""
+"""No farther beyond the workspace than a viewpoint may be; zeros are allowed, too."""
 FAR_POSE = Values("far_pose_low", "far_pose_high")
 GRID_PLACE = Values("grid_place_low", "grid_place_high")
 """In grid units."""

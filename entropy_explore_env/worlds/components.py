@@ -9,7 +9,7 @@ from scipy import ndimage
 
 
 def connected_components(mask: np.ndarray) -> tuple[np.ndarray, int]:
-    """Return number the face-connected components of a mask.
+    """Label the face-connected components of a mask with numbers.
 
     Args:
         mask: (X, Y) or (X, Y, Z) bool.
