@@ -115,7 +115,7 @@ def _steps(range_: float, flat: bool) -> np.ndarray:
 
 @lean_kernel
 def _look(left, places, free, steps, found):
-    """Note which voxels can be seen from some place: mostly from the one that saw the voxel before.
+    """Note which voxels can be seen from some place.
 
     Args:
         left: (N, 3) int64, the voxels.
@@ -124,33 +124,16 @@ def _look(left, places, free, steps, found):
         steps: (M, 3) int16, from a voxel to places within range, the nearest first.
         found: (N,) bool; filled.
     """
-    if len(steps) == 0:
-        return
-    farthest = np.int64(steps[-1, 0]), np.int64(steps[-1, 1]), np.int64(steps[-1, 2])
-    longest = _squared(farthest)
-    seen_from, any_seen = (np.int64(0), np.int64(0), np.int64(0)), False
     for n in range(len(left)):
         voxel = left[n, 0], left[n, 1], left[n, 2]
-        if any_seen:
-            step = seen_from[0] - voxel[0], seen_from[1] - voxel[1], seen_from[2] - voxel[2]
-            if _squared(step) <= longest and _is_open(free, voxel, step):
-                found[n] = True
-                continue
         for m in range(len(steps)):
             step = np.int64(steps[m, 0]), np.int64(steps[m, 1]), np.int64(steps[m, 2])
             x, y, z = voxel[0] + step[0], voxel[1] + step[1], voxel[2] + step[2]
             if not (0 <= x < free.shape[0] and 0 <= y < free.shape[1] and 0 <= z < free.shape[2]):
                 continue
             if places[x, y, z] and _is_open(free, voxel, step):
-                found[n] = any_seen = True
-                seen_from = x, y, z
+                found[n] = True
                 break
-
-
-@lean_kernel
-def _squared(step):
-    """Return the squared length of a step of voxels."""
-    return step[0] * step[0] + step[1] * step[1] + step[2] * step[2]
 
 
 @lean_kernel
