@@ -102,12 +102,13 @@ def _heights_m(raw: np.ndarray, tags: Mapping[int, Any], keys: Mapping[str, Any]
         with np.errstate(over="ignore", invalid="ignore"):
             rows[raw == np.float64(stated).astype(raw.dtype)] = np.nan
     about = _gdal_items(tags.get(_GDAL_METADATA))
-    unit_m = _unit_m(keys, "VerticalUnits")
     named = about.get("unittype", "").strip().lower()
-    if named and "VerticalUnitsGeoKey" not in keys:
-        if named not in _METRES_BY_NAME:
-            raise RefusedError(f"a GeoTIFF whose heights are in {_UNITS}, not in {named[:40]}")
+    if not named or "VerticalUnitsGeoKey" in keys:
+        unit_m = _unit_m(keys, "VerticalUnits")
+    elif named in _METRES_BY_NAME:
         unit_m = _METRES_BY_NAME[named]
+    else:
+        raise RefusedError(f"a GeoTIFF whose heights are in {_UNITS}, not in {named[:40]}")
     return (rows * float(about.get("scale", 1.0)) + float(about.get("offset", 0.0))) * unit_m
 
 
@@ -142,15 +143,15 @@ def _place(tags: Mapping[int, Any]) -> _Place | None:
 
 
 def _unit_m(keys: Mapping[str, Any], name: str) -> float:
-    """Metres of a unit that the keys state, 1 where they state none.
+    """Metres of the unit that the keys state, else of that of the reference system that they state, else 1.
 
     Args:
         keys: Name of a GeoKey → its value.
         name: `ProjLinearUnits` or `VerticalUnits`.
 
     Raises:
-        RefusedError: The unit is none that is known.
-        MissingExtraError: pyproj is not installed, which knows the unit of a reference system.
+        RefusedError: The unit or the reference system is unknown.
+        MissingExtraError: pyproj, which knows the units of reference systems, is needed and not installed.
     """
     if f"{name}GeoKey" not in keys:
         return _unit_of_system_m(int(keys.get(_SYSTEM_OF_UNITS[name], 0)))
