@@ -24,8 +24,7 @@ def write_atomically(path: Path, content: bytes | str) -> None:
             os.fsync(file.fileno())
         Path(temporary).chmod(0o644)
         Path(temporary).replace(path)
-    except BaseException as error:
+    except OSError as error:  # a full disk has no name, and the temporary file's says nothing
+        raise OSError(error.errno, error.strerror, str(path)) from None
+    finally:
         Path(temporary).unlink(missing_ok=True)
-        if isinstance(error, OSError):  # a full disk has no name, and the temporary file's says nothing
-            raise OSError(error.errno, error.strerror, str(path)) from None
-        raise

@@ -149,6 +149,7 @@ class CommandRecorder:
 
         Raises:
             CallOrderError: The mission was never reset.
+            RecordError: Its world changed under way.
         """
         missions = self._missions
         if missions.episodes[0] < 0:
@@ -303,12 +304,14 @@ def load_record(path: Path | str) -> MissionRecord:
 
 def _head(entries: Mapping[str, np.ndarray]) -> Head:
     """Return the head of a record of this format, as it was written."""
-    if "head" not in entries and str(entries.get("format")) != FORMAT:
-        raise RefusedError("a mission record, as --record writes it")
-    text = entries["head"].tobytes() if "head" in entries else b'{"format": "", "version": 0}'
+    other = f"a mission record of format version {FORMAT_VERSION}: this one has another form"
+    if "head" not in entries:  # versions before 4 had entries in its place
+        older = str(entries.get("format")) == FORMAT
+        raise RefusedError(other if older else "a mission record, as --record writes it")
+    text = entries["head"].tobytes()
     form = msgspec.json.decode(text, type=Form)
     if (form.format, form.version) != (FORMAT, FORMAT_VERSION):
-        raise RefusedError(f"a mission record of format version {FORMAT_VERSION}: this one has another form")
+        raise RefusedError(other)
     if not entries.keys() <= _ENTRIES or _checksum(entries) != str(entries["checksum"]):
         raise RefusedError("a mission record as it was written: this one was changed or damaged")
     return msgspec.json.decode(text, type=Head)
