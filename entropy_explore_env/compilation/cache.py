@@ -2,6 +2,9 @@
 
 The name holds a digest of all that the code depends on, so that a file is never out of date, programs of
 different versions do not overwrite each other's, and processes that compile the same write the same.
+
+The files are pickles, as those of Numba's own cache: whoever can write into their folder can run code as the
+user. It is in the user's own cache folder; a `NUMBA_CACHE_DIR` must not be writable for others either.
 """
 
 from __future__ import annotations
@@ -29,7 +32,7 @@ from entropy_explore_env.compilation.folder import (
 from entropy_explore_env.compilation.numba_parts import CODE_SETTINGS, Dispatcher, config, dumps, sigutils
 from entropy_explore_env.compilation.stamps import NoStampError, describe_type, stamp
 
-_SOURCES = ("dispatchers.py", "kernels.py", "cache.py", "numba_parts.py")
+_SOURCES = ("dispatchers.py", "libraries.py", "kernels.py", "cache.py", "numba_parts.py")
 _COMPILED_BY = hashlib.sha256(
     b"".join(pkgutil.get_data(__package__ or "", name) or b"" for name in _SOURCES)
 ).hexdigest()
@@ -79,8 +82,10 @@ class KernelCache:
 
 def load(path: Path | None, sig: Any) -> Any:  # noqa: ANN401 - a signature; what a result of compiling reduces to
     """Return what was written into a file for a signature; None = nothing, or something else."""
-    data = None if path is None else _read(path)
-    if path is None or data is None:
+    if path is None:
+        return None
+    data = _read(path)
+    if data is None:
         return None
     kept_sig, reduced = pickle.loads(data)
     if kept_sig != _normal(sig):

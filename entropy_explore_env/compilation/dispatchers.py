@@ -10,20 +10,18 @@ from __future__ import annotations
 
 import gc
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import llvmlite.binding as llvm
-
-from entropy_explore_env.compilation import announcement, cache, helper
+from entropy_explore_env.compilation import announcement, cache, second_process
 from entropy_explore_env.compilation.folder import kernel_folder
+from entropy_explore_env.compilation.libraries import InnerLowering, OuterLowering, rebuilt_inner
 from entropy_explore_env.compilation.locks import Claim, claim
 from entropy_explore_env.compilation.numba_parts import (
     UNUSED_PASSES,
     AnalysisPass,
     CPUDispatcher,
-    JITCodeLibrary,
     NativeLowering,
     NopythonTypeInference,
     PassManager,
@@ -38,9 +36,9 @@ from entropy_explore_env.compilation.numba_parts import (
 from entropy_explore_env.compilation.stamps import forget_parts, tree_size
 
 _WRAPPERS = {"no_cfunc_wrapper": True}
-_WORTH_DIVIDING = 10
-"""From this number of kernels on two processes compile; finding what each of them does costs time, too."""
 _NO_WRAPPERS = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
+_WORTH_DIVIDING = 10
+"""Trees of at least this many kernels are compiled by two processes: to divide the work costs time, too."""
 
 
 class _Compiling:
@@ -191,10 +189,10 @@ class CalleesFirst(AnalysisPass):
     def run_pass(self, state: Any) -> bool:  # noqa: ANN401 - Numba's bag of everything
         """Go through the calls whose types are known, again while there are new ones."""
         compiling, tried = _state.kernels[-1], set()
-        divided = helper.shared() and tree_size(compiling.form.disk.kernel) >= _WORTH_DIVIDING
+        divided = second_process.shared() and tree_size(compiling.form.disk.kernel) >= _WORTH_DIVIDING
         while divided and (calls := [call for call in _survey(state) if call not in tried]):
             tried.update(calls)
-            for kernel, args in reversed(calls) if helper.serves() else calls:
+            for kernel, args in reversed(calls) if second_process.serves() else calls:
                 try:
                     kernel.compile(args)
                 except errors.NumbaError:  # the types may not be the last word; if they are, it is met again
@@ -225,124 +223,6 @@ def _survey(state: Any) -> list[tuple[InnerKernel, tuple[types.Type, ...]]]:  # 
     finally:
         found, _state.found = _state.found, None
     return list(found)
-
-
-class InnerLibrary(JITCodeLibrary):
-    """The intermediate code of an inner kernel and of all that it calls: not translated.
-
-    It is simplified function by function, and optimised with the outermost kernel. Inlined kernels, the
-    innermost loops, are optimised before that, too: code that was optimised once traces rays 10 % slower.
-    """
-
-    optimised = False
-    """Whether it is an inlined kernel."""
-
-    def enable_object_caching(self) -> None:
-        """There is no object code."""
-
-    def _optimize_final_module(self) -> None:
-        if self.optimised:
-            super()._optimize_final_module()
-
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()
-        self._finalized = True
-
-    def serialize_using_object_code(self) -> tuple[str, str, bytes]:
-        """Return what is kept of it."""
-        return self.serialize_using_bitcode()
-
-    @classmethod
-    def from_bitcode(cls, codegen: Any, state: tuple[str, str, bytes]) -> InnerLibrary:  # noqa: ANN401
-        """Return what `serialize_using_object_code` was made of, ready to be linked."""
-        name, _, bitcode = state
-        library = cls(codegen, name)
-        library._final_module = llvm.parse_bitcode(bitcode)
-        library._finalize_final_module()
-        return library
-
-
-class OuterLibrary(JITCodeLibrary):
-    """The machine code of what Python calls, kept on disk without intermediate code: nothing links it."""
-
-    def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
-        """Return what is kept of it: the machine code, and the names that it defines."""
-        self._ensure_finalized()
-        return self.name, "object", (self._get_compiled_object(), _names_alone(self._final_module))
-
-
-def _names_alone(module: Any) -> bytes:  # noqa: ANN401 - of LLVM
-    """Return the bitcode of a module that defines the same names and holds nothing else."""
-    functions = [f"define void @{_quoted(one.name)}() {{ ret void }}" for one in _defined(module.functions)]
-    variables = [f"@{_quoted(one.name)} = global i8 0" for one in _defined(module.global_variables)]
-    return llvm.parse_assembly("\n".join(functions + variables)).as_bitcode()
-
-
-def _defined(values: Iterable[Any]) -> Iterator[Any]:
-    return (value for value in values if not value.is_declaration)
-
-
-def _quoted(name: str) -> str:
-    """Return a name as LLVM's assembly writes it."""
-    letters = (chr(byte) if chr(byte).isalnum() else f"\\{byte:02x}" for byte in name.encode())
-    return f'"{"".join(letters)}"'
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class OuterLowering(NativeLowering):
-    """Lowers into an `OuterLibrary`."""
-
-    _name = "outer_lowering"
-
-    def run_pass(self, state: Any) -> bool:  # noqa: ANN401 - Numba's bag of everything
-        """Lower as Numba does."""
-        state.library = OuterLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.enable_object_caching()
-        return super().run_pass(state)
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class InnerLowering(NativeLowering):
-    """Lowers into an `InnerLibrary`."""
-
-    _name = "inner_lowering"
-
-    def run_pass(self, state: Any) -> bool:  # noqa: ANN401 - Numba's bag of everything
-        """Lower, and give the result an entry point that is only a name for it."""
-        state.library = InnerLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.optimised = state.flags.forceinline
-        state.flags.no_compile = True
-        super().run_pass(state)
-        state.library._ensure_finalized()
-        state.reload_init.extend(getattr(state.library, "_reload_init", ()))  # since Numba 0.62
-        state.cr = state.cr._replace(cfunc=object())
-        return True
-
-
-def _rebuilt_inner(target_context: Any, reduced: tuple[Any, ...]) -> compiler.CompileResult:  # noqa: ANN401
-    """Return the inverse of `CompileResult._reduce` for an inner kernel."""
-    library, fndesc, environment, signature, objectmode, lifted, annotation, reload_init, environments = (
-        reduced
-    )
-    for function in reload_init:
-        function()
-    return compiler.CompileResult(
-        typing_context=target_context.typing_context,
-        target_context=target_context,
-        entry_point=object(),
-        typing_error=None,
-        type_annotation=annotation,
-        signature=signature,
-        objectmode=objectmode,
-        lifted=lifted,
-        fndesc=fndesc,
-        library=InnerLibrary.from_bitcode(target_context.codegen(), library),
-        call_helper=None,
-        environment=environment,
-        metadata=None,
-        reload_init=reload_init,
-        referenced_envs=environments,
-    )
 
 
 class _Form(CPUDispatcher):
@@ -389,9 +269,11 @@ class _Form(CPUDispatcher):
         return reduced is not None
 
     def _rebuilt(self, reduced: tuple[Any, ...]) -> compiler.CompileResult:
+        """Return a result of compiling from what its `_reduce` gave; each form defines it."""
         raise NotImplementedError
 
     def _keep(self, result: compiler.CompileResult) -> None:
+        """Make a result known to those that call this form; each form defines it."""
         raise NotImplementedError
 
 
@@ -420,7 +302,7 @@ class InnerKernel(_Form):
         return super().get_call_template(args, kws)
 
     def _rebuilt(self, reduced: tuple[Any, ...]) -> compiler.CompileResult:
-        return _rebuilt_inner(self.targetctx, reduced)
+        return rebuilt_inner(self.targetctx, reduced)
 
     def _keep(self, result: compiler.CompileResult) -> None:
         self.targetctx.insert_user_function(result.entry_point, result.fndesc, [result.library])
@@ -454,7 +336,7 @@ class Kernel(_Form):
 
     def _result(self, compiling: _Compiling, args: Any, return_type: Any) -> compiler.CompileResult:  # noqa: ANN401
         """As of every form; says so, and lets the helper take part."""
-        helper.send([(self, tuple(args))])
+        second_process.send([(self, tuple(args))])
         with announcement.compiling(self.disk.module_name, kernel_folder()):
             return super()._result(compiling, args, return_type)
 

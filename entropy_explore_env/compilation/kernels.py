@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numba import typeof
 
-from entropy_explore_env.compilation import helper
+from entropy_explore_env.compilation import second_process
 from entropy_explore_env.compilation.dispatchers import Kernel
 from entropy_explore_env.compilation.numba_parts import config
 from entropy_explore_env.compilation.stamps import forget_parts
@@ -95,8 +95,10 @@ def compile_ahead(calls: Iterable[tuple[Any, tuple[Any, ...]]]) -> None:
     forget_parts()
     missing = []
     for compiled, arguments in calls:
+        if not isinstance(compiled, Kernel):  # compiling is switched off
+            continue
         types = tuple(typeof(argument) for argument in arguments)
-        if isinstance(compiled, Kernel) and not compiled.is_ready(types):
+        if not compiled.is_ready(types):
             missing.append((compiled, types))
     if missing:
-        helper.send(missing, start=True)
+        second_process.send(missing, start=True)

@@ -13,8 +13,9 @@ from numba.core.errors import NumbaError
 from numba.core.registry import CPUDispatcher
 
 from entropy_explore_env.compilation import cache, stamps
-from entropy_explore_env.compilation.dispatchers import InnerKernel, InnerLibrary, Kernel
+from entropy_explore_env.compilation.dispatchers import InnerKernel, Kernel
 from entropy_explore_env.compilation.kernels import inlined_kernel, kernel, lean_kernel
+from entropy_explore_env.compilation.libraries import InnerLibrary
 
 
 @pytest.fixture(autouse=True)

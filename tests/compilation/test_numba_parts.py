@@ -27,13 +27,14 @@ from entropy_explore_env.compilation.numba_parts import (
     [
         (CPUDispatcher, ("compile", "add_overload", "_numba_type_", "_reduce_states", "_rebuild")),
         (JITCodeLibrary, ("_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals")),
+        (JITCodeLibrary, ("_ensure_finalized", "_get_compiled_object")),
         (JITCodeLibrary, ("serialize_using_bitcode", "serialize_using_object_code", "enable_object_caching")),
         (compiler.CompileResult, ("_reduce", "_rebuild", "_find_referenced_environments")),
         (compiler.Compiler, ("define_pipelines",)),
         (compiler.Flags, ("copy", "nrt", "forceinline", "no_compile")),
         (vars(dispatcher)["_FunctionCompiler"], ("compile", "fold_argument_types", "_customize_flags")),
         (NativeLowering, ("run_pass",)),
-        (llvm, ("parse_bitcode",)),
+        (llvm, ("parse_bitcode", "parse_assembly")),
     ],
 )
 def test_what_is_overridden_or_called_exists(owner, names):

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from entropy_explore_env.compilation import helper
+from entropy_explore_env.compilation import second_process
 from tests.compilation.test_kernels import run, start
 from tests.systems import needs_posix
 
@@ -20,20 +20,20 @@ CODE += f"\n\n@lean_kernel\ndef caller(x):\n    return {CALLS}\n"
 ASK = """
 import time
 from pathlib import Path
-from entropy_explore_env.compilation import helper
+from entropy_explore_env.compilation import second_process
 from entropy_explore_env.compilation.announcement import compiled_kernels
 from entropy_explore_env.compilation.kernels import compile_ahead
 from mine import caller
 
-helper._processors = lambda: {processors}
+second_process._processors = lambda: {processors}
 compile_ahead([(caller, (1.0,))])
 until_s = time.monotonic() + {patience_s}
 while not list(Path("cache").rglob("mine.caller-*.kernel")) and time.monotonic() < until_s:
     time.sleep(0.05)
-print(helper.shared(), caller(1.0), len(compiled_kernels()), flush=True)
+print(second_process.shared(), caller(1.0), len(compiled_kernels()), flush=True)
 """
-WAIT = "print(helper._helper.process.pid, flush=True)\ninput()\n"
-REVERSED = "from entropy_explore_env.compilation import helper\nhelper._helper.serving = {}\n"
+WAIT = "print(second_process._helper.process.pid, flush=True)\ninput()\n"
+REVERSED = "from entropy_explore_env.compilation import second_process\nsecond_process._helper.serving = {}\n"
 REVERSED += "from mine import caller\nprint(caller(1.0))"
 
 
@@ -82,5 +82,5 @@ def test_the_helper_begins_with_the_last_call(folder, serving):
 
 
 def test_processes_of_a_pool_start_none(monkeypatch):
-    monkeypatch.setattr(helper.multiprocessing, "parent_process", lambda: object())
-    assert not helper._is_wanted()
+    monkeypatch.setattr(second_process.multiprocessing, "parent_process", lambda: object())
+    assert not second_process._is_wanted()

@@ -2,7 +2,8 @@
 
 Both are given the same kernels. This one goes through the kernels that each of them calls from the first to
 the last, the helper from the last to the first; what one has compiled the other finds on disk, and they meet
-in the middle. The helper ends with this process, or when it has had nothing to do for a while.
+in the middle. The helper starts when a step's kernels are not on disk, never else. It ends with this process,
+or when it has had nothing to do for a while.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from entropy_explore_env.compilation.folder import kernel_folder
 from entropy_explore_env.compilation.numba_parts import config, dumps
 
 _IDLE_S = 30.0
-_CODE = "from entropy_explore_env.compilation.helper import serve; serve()"
+_CODE = "from entropy_explore_env.compilation.second_process import serve; serve()"
 
 
 class _Helper:
