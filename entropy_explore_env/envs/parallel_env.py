@@ -121,8 +121,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         Raises:
             CallOrderError: There was no reset yet.
         """
-        if self.missions.episodes[0] < 0:
-            raise CallOrderError("state before reset: call reset() first")
+        self.missions.check_begun("state")
         return self.missions.observations[0].flatten()
 
     def view(self, agent: str) -> RobotView:
@@ -132,8 +131,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
             CallOrderError: There was no reset yet.
             SettingError: No robot has this name.
         """
-        if self.missions.episodes[0] < 0:
-            raise CallOrderError("view before reset: call reset() first")
+        self.missions.check_begun("view")
         return view_of(self.missions, 0, self.possible_agents.index(self._checked(agent)))
 
     def _checked(self, agent: str) -> str:
@@ -147,8 +145,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         Raises:
             CallOrderError: There was no reset yet.
         """
-        if self.missions.episodes[0] < 0:
-            raise CallOrderError("deciding_agents before reset: call reset() first")
+        self.missions.check_begun("deciding_agents")
         deciding = self.missions.state.robots[0]["deciding"].tolist()
         return [agent for agent, decides in zip(self.agents, deciding, strict=False) if decides]
 
@@ -247,8 +244,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         Raises:
             CallOrderError: There was no reset yet.
         """
-        if self.missions.episodes[0] < 0:
-            raise CallOrderError("joint_map before reset: call reset() first")
+        self.missions.check_begun("joint_map")
         return joint_map(self.missions)
 
     def set_world_block(
@@ -323,7 +319,7 @@ class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):
             CallOrderError: There was no reset yet.
             SettingError: No robot has this name.
         """
-        self._begun("observe")
+        self._team.missions.check_begun("observe")
         self._team.observation_space(agent)
         return super().observe(agent)
 
@@ -333,16 +329,12 @@ class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):
         Raises:
             CallOrderError: There was no reset yet.
         """
-        self._begun("last")
+        self._team.missions.check_begun("last")
         return super().last(observe)
 
     def state(self) -> np.ndarray:
         """Return what all robots observe; see `EntropyExploreEnv.state`."""
         return self._team.state()
-
-    def _begun(self, call: str) -> None:
-        if self._team.missions.episodes[0] < 0:
-            raise CallOrderError(f"{call} before reset: call reset() first")
 
     def step(self, action: Any) -> None:  # noqa: ANN401 - PettingZoo's signature
         """Take the action of the robot whose turn it is; see `EntropyExploreEnv.step`.

@@ -93,8 +93,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
 
     def step(self, action: object) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Advance by one step; see `EntropyExploreEnv.step`."""
-        if self.missions.episodes[0] < 0:
-            raise CallOrderError("step before reset: call reset() first")
+        self.missions.check_begun("step")
         if self.missions.over(0) is not MissionEnd.RUNNING:
             raise CallOrderError("step after the mission's end: call reset() first")
         continuous, discrete = self._checker.one("robot_0", action)
@@ -125,8 +124,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
 
     def view(self) -> RobotView:
         """Return what the robot knows; strategies see this and nothing else."""
-        if self.missions.episodes[0] < 0:
-            raise CallOrderError("view before reset: call reset() first")
+        self.missions.check_begun("view")
         return view_of(self.missions, 0, 0)
 
     def __repr__(self) -> str:

@@ -55,6 +55,7 @@ class Missions:
         worlds: The true world of each mission; None before its first reset.
         world_numbers: (E,) int64, its number in each mission; -1 where no recipe made it.
         options: What was given to the latest reset of each mission, instead of drawing it.
+        world_changed: Whether `set_world_block` has changed the world of each mission since its reset.
         every_reset: What resets are given that say nothing of it, also where missions start by themselves.
         reward_function: Name of the function that rewards the robots in place of the scenario's reward, for
             records; empty = none. Missions themselves always reward by the scenario.
@@ -150,6 +151,11 @@ class Missions:
         """
         self.reset_some([self._checked(mission)], [seed], [options])
 
+    def check_begun(self, call: str, mission: int = 0) -> None:
+        """Raise a CallOrderError that names a call, unless a mission was reset before it."""
+        if self.episodes[self._checked(mission)] < 0:
+            raise CallOrderError(f"{call} before reset: call reset() first")
+
     def _checked(self, mission: int) -> int:
         """Return the number of a mission, if there is one."""
         if not is_whole(mission, 0, self.count - 1):
@@ -213,9 +219,7 @@ class Missions:
         if world.ceiling is not None and not self._no_fly.size and self._compiled_step.knows_ceiling:
             self._no_fly = np.zeros((len(self._no_fly), self.grid.voxels), np.bool_)
         if world is not self.worlds[mission]:
-            self.worlds[mission] = world
-            self.state.truth[mission] = true_coverage(world.occupied, world.unreadable)
-            self._set_collision_masks(mission, world)
+            self._set_world(mission, world)
         fill_start(self.scenario, self.rules, self.state, start)
         if self._returning is not None:
             self._returning.begin(self.state, mission, self.grid.voxels)
@@ -225,8 +229,10 @@ class Missions:
         """Return what a step reads and changes."""
         return Arrays(self.state, self._no_fly, self.observations)
 
-    def _set_collision_masks(self, mission: int, world: World) -> None:
-        """Prepare what is in the way of the team's bodies."""
+    def _set_world(self, mission: int, world: World) -> None:
+        """Put a mission into a world: its truth, and what is in the way of the team's bodies."""
+        self.worlds[mission] = world
+        self.state.truth[mission] = true_coverage(world.occupied, world.unreadable)
         for robot in range(min(len(self.scenario.kinds), self.scenario.robots)):
             params, kind = self.rules.params[robot], self.scenario.kind_of(robot)
             row = mission * params["bodies"] + params["body_number"]
@@ -257,8 +263,7 @@ class Missions:
             SettingError: The box holds no voxel, the time has passed, or a robot is in the way now.
             WorldError: No free voxel would be left.
         """
-        if self.episodes[self._checked(mission)] < 0:
-            raise CallOrderError("set_world_block before reset: call reset() first")
+        self.check_begun("set_world_block", mission)
         now_s = float(self.state.missions[mission]["time_s"])
         if at_s is not None and not (is_number(at_s) and now_s <= at_s < np.inf):
             raise SettingError("at_s", at_s, f"None, or finite seconds from {now_s:g} on")
@@ -274,10 +279,9 @@ class Missions:
         """Change a mission's world now."""
         world = self.worlds[mission]
         assert world is not None
-        after, before = changed_world(world, change), self.state.truth[mission].copy()
-        self.worlds[mission], self.world_changed[mission] = after, True
-        self.state.truth[mission] = true_coverage(after.occupied, after.unreadable)
-        self._set_collision_masks(mission, after)
+        before = self.state.truth[mission].copy()
+        self._set_world(mission, changed_world(world, change))
+        self.world_changed[mission] = True
         prior = float(self.rules.params["prior_precision"][0])
         rescore(self.state, mission, before, self.state.truth[mission], prior)
 
@@ -297,8 +301,7 @@ class Missions:
             SettingError: There is no such mission.
             CallOrderError: The mission was never reset.
         """
-        if self.episodes[self._checked(mission)] < 0:
-            raise CallOrderError("strategy_generator before reset: call reset() first")
+        self.check_begun("strategy_generator", mission)
         return generator(self.seeds[mission], self.episodes[mission], Stream.STRATEGY)
 
     def step(self, continuous: np.ndarray, discrete: np.ndarray) -> np.ndarray:

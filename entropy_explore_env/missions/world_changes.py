@@ -25,19 +25,18 @@ from entropy_explore_env.worlds.world import World
 class WorldChange(NamedTuple):
     """A block of voxels that becomes solid or free."""
 
-    low: tuple[int, int, int]
-    """First voxel."""
-    high: tuple[int, int, int]
-    """One past the last."""
+    low: tuple[int, ...]
+    """Indices (x, y, z) of the first voxel."""
+    high: tuple[int, ...]
+    """One past those of the last."""
     solid: bool
     at_s: float
     """When, in simulated time."""
 
     @property
-    def block(self) -> tuple[slice, slice, slice]:
+    def block(self) -> tuple[slice, ...]:
         """The block as an index of arrays (X, Y, Z)."""
-        x, y, z = (slice(a, b) for a, b in zip(self.low, self.high, strict=True))
-        return x, y, z
+        return tuple(slice(first, end) for first, end in zip(self.low, self.high, strict=True))
 
 
 def checked_change(
@@ -46,7 +45,8 @@ def checked_change(
     """Return a change of the voxels whose centres lie in a box.
 
     Raises:
-        SettingError: The box is none, or holds no centre of a voxel.
+        SettingError: A corner is not three finite numbers, `solid` is not a bool, or the box holds no centre
+            of a voxel.
     """
     for name, corner in (("low_m", low_m), ("high_m", high_m)):
         given = corner if isinstance(corner, tuple | list | np.ndarray) else ()
@@ -55,15 +55,14 @@ def checked_change(
     if not isinstance(solid, bool):
         raise SettingError("solid", solid, "True or False")
     origin, edge_m = np.asarray(grid.origin_m), grid.voxel_size_m
-    low = np.ceil((np.asarray(low_m) - origin) / edge_m - 0.5 - 1e-9).astype(np.int64)
-    high = np.floor((np.asarray(high_m) - origin) / edge_m - 0.5 + 1e-9).astype(np.int64) + 1
-    low, high = np.maximum(low, 0), np.minimum(high, grid.shape)
+    low = np.ceil((np.asarray(low_m) - origin) / edge_m - 0.5 - 1e-9)
+    high = np.floor((np.asarray(high_m) - origin) / edge_m - 0.5 + 1e-9) + 1.0
+    low, high = (np.clip(corner, 0.0, grid.shape).astype(np.int64) for corner in (low, high))
     if (low >= high).any():
         end = origin + grid.size_m
         allowed = f"a box with centres of voxels, inside {origin.tolist()} to {end.tolist()} m"
         raise SettingError("low_m, high_m", (tuple(low_m), tuple(high_m)), allowed)
-    first, last = (int(v) for v in low), (int(v) for v in high)
-    return WorldChange(tuple(first), tuple(last), solid, at_s)  # type: ignore[arg-type]
+    return WorldChange(tuple(low.tolist()), tuple(high.tolist()), solid, at_s)
 
 
 def changed_world(world: World, change: WorldChange) -> World:
@@ -81,7 +80,9 @@ def changed_world(world: World, change: WorldChange) -> World:
 
 def robot_in_the_way(rules: Rules, state: MissionState, mission: int, change: WorldChange) -> int | None:
     """Return the first robot whose body, or the drive that it is on, touches a block; None = none does."""
-    for number, robot in enumerate(state.robots[mission] if change.solid else ()):
+    if not change.solid:
+        return None
+    for number, robot in enumerate(state.robots[mission]):
         params = rules.params[number]
         edge_m, origin = float(params["voxel_size_m"]), params["origin_m"]
         low, high = origin + np.array(change.low) * edge_m, origin + np.array(change.high) * edge_m
@@ -100,7 +101,7 @@ def robot_in_the_way(rules: Rules, state: MissionState, mission: int, change: Wo
 
 
 def rescore(state: MissionState, mission: int, before: np.ndarray, after: np.ndarray, prior: float) -> None:
-    """Bring the figures of the joint map up to date with a truth (V,) that is another one now."""
+    """Bring the figures of the joint map up to date with a truth (V,) that has changed."""
     if not state.joint_mean.shape[1]:
         return
     voxels = np.flatnonzero(before != after)

@@ -152,8 +152,7 @@ class CommandRecorder:
             RecordError: Its world changed under way.
         """
         missions = self._missions
-        if missions.episodes[0] < 0:
-            raise CallOrderError("record before reset: call reset() first")
+        missions.check_begun("record")
         if missions.world_changed[0]:
             raise RecordError("mission", "its world changed under way", "one in a world that stays as it is")
         starts, number, world = missions.options[0]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from gymnasium import logger
 
-from entropy_explore_env.errors import CallOrderError, SettingError, did_you_mean
+from entropy_explore_env.errors import SettingError, did_you_mean
 from entropy_explore_env.missions.localization import pose_errors
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.animation import Window
@@ -102,8 +102,7 @@ class Painter:
             logger.warn("render() shows nothing: give the environment render_mode='rgb_array' or 'human'")
         if self._mode != "rgb_array":
             return None
-        if missions.episodes[self._number] < 0:
-            raise CallOrderError("render before reset: call reset() first")
+        missions.check_begun("render", self._number)
         return self.paint(missions)
 
     def __getstate__(self) -> dict[str, object]:

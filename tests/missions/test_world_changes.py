@@ -80,6 +80,7 @@ def test_bad_blocks_are_refused_and_records_say_so():
         ((0.0, 0.0), (1.0, 1.0, 1.0), {}, r"low_m = .*three finite numbers"),
         ((0.0, 0.0, 0.0), (np.nan, 1.0, 1.0), {}, r"high_m = .*three finite numbers"),
         ((9.0, 0.0, 0.0), (9.5, 1.0, 1.0), {}, r"low_m, high_m = .*centres of voxels"),
+        ((1e300, 0.0, 0.0), (3.0, 1.0, 1.0), {}, r"low_m, high_m = .*centres of voxels"),
         ((0.0, 2.5, 1.0), (0.5, 3.0, 1.5), {}, "robot 0 does not touch"),
         (*DOOR, {"at_s": -1.0}, r"at_s = -1.0"),
         (*DOOR, {"solid": 1}, "solid = 1: .*True or False"),
