@@ -157,7 +157,7 @@ def fuse_row(mean, precision, first, last, coverage, measured):
 
 @inlined_kernel
 def expected_utility(precision, crossed, n, measured):
-    """Return utility in bits that a ray over these voxels would bring; nothing is changed (eq. 27).
+    """Return the utility in bits that a ray over these voxels would bring; nothing is changed (eq. 27).
 
     Args:
         precision: (V,) float32, 1/σ².

@@ -7,13 +7,13 @@ from entropy_explore_env.compilation.kernels import inlined_kernel
 
 @inlined_kernel
 def flat_index(size, x, y, z):
-    """Return number of the voxel with the indices (x, y, z) in a grid of (X, Y, Z) voxels."""
+    """Return the number of the voxel with the indices (x, y, z) in a grid of (X, Y, Z) voxels."""
     return (x * size[1] + y) * size[2] + z
 
 
 @inlined_kernel
 def grid_index(size, voxel):
-    """Return indices (x, y, z) of a voxel by its number.
+    """Return the indices (x, y, z) of a voxel by its number.
 
     Without a division: (v + ½)/Z is never so near to a whole number that rounding could reach it.
     """

@@ -295,7 +295,7 @@ def check_conformance(
 
 
 def main(words: Sequence[str]) -> int:
-    """Return the command; returns its exit code: 0 all holds, 1 something does not."""
+    """Run the command and return its exit code: 0 if all holds, 1 if something does not."""
     parser = LineParser("python -m entropy_explore_env conformance")
     parser.add_argument("scenario", metavar="SCENARIO", help="name of a scenario")
     parser.add_argument("--world", help="a world file in place of the scenario's world")

@@ -38,7 +38,7 @@ def robot_infos(missions: Missions, mission: int, texts: bool = True) -> list[di
     those of `mission_figures`, and beside them the two of END_FIGURES. Where the mission ends by what the
     team has seen also `seen_share`, of all that can be seen. Where the scenario has faults
     also `stopped`, `blind` and `silent`: whether the robot fails so now. Where robots drift also
-    `pose_error_m` and `pose_error_rad`: so far off was what the robot believed of its pose
+    `pose_error_m` and `pose_error_rad`: how far off the robot's estimate of its pose was
     when it last scanned or decided under way; nothing acts on it.
 
     Args:
@@ -75,8 +75,9 @@ def robot_infos(missions: Missions, mission: int, texts: bool = True) -> list[di
         )
     ]
     if missions.scenario.ending.by_seen:
+        seen_share = float(clock["explored_visible"] / max(clock["visible"], 1))
         for info in infos:
-            info["seen_share"] = float(clock["explored_visible"] / max(clock["visible"], 1))
+            info["seen_share"] = seen_share
     if missions.rules.faults is not None:
         for name, now in failing(missions.state.faults[mission], time_s).items():
             for info, failed in zip(infos, now.tolist(), strict=True):

@@ -61,7 +61,7 @@ def check_bad_actions(task: Task) -> None:
 
 
 def bad_actions(task: Task, good: np.ndarray) -> dict[str, Any]:
-    """Yield what must be refused in place of a robot's or a VectorEnv's action, by what is wrong with it."""
+    """Return what must be refused in place of a robot's or a VectorEnv's action, by what is wrong with it."""
     wrong: dict[str, Any] = {"None": None, "text": "up", "a dict": {}, "ragged": [[0.0], [0.0, 0.0]]}
     wrong |= {"complex": good * 1j, "too many": np.stack([good, good]), "an object": object()}
     if task.scenario.action.by_number:

@@ -13,8 +13,8 @@ _RUNNING, _MAPPED = MissionEnd.RUNNING.code, MissionEnd.MAPPED.code
 _SEEN, _STOPPED = MissionEnd.SEEN.code, MissionEnd.STOPPED.code
 _EXHAUSTED = MissionEnd.EXHAUSTED.code
 IDLE_SCANS, IDLE_ROUNDS = 100, 8.0
-"""A mission that ends by what was seen asks what is left when this many scans a robot showed nothing new,
-and while the team drove so often along all edges of the workspace, a robot on average."""
+"""A mission that ends by what was seen asks what is left when, a robot on average, this many scans have shown
+nothing new and this many times the workspace's length, width and height together were driven meanwhile."""
 
 
 @lean_kernel
@@ -75,15 +75,18 @@ def exhausted(mission):
     if clock.idle_scans < IDLE_SCANS * len(robots):
         return False
     edges_m = (shared.size[0] + shared.size[1] + shared.size[2]) * shared.voxel_size_m
-    if driven_m(robots) - clock.idle_from_m < IDLE_ROUNDS * edges_m * len(robots):
+    now_m = driven_m(robots)
+    if now_m - clock.idle_from_m < IDLE_ROUNDS * edges_m * len(robots):
         return False
-    clock.idle_scans, clock.idle_from_m = 0, driven_m(robots)
+    clock.idle_scans, clock.idle_from_m = 0, now_m
     if clock.explored_visible >= clock.explored_end and clock.explored_free >= clock.explored_free_end:
         return False
     prior = np.float32(shared.prior_precision)
     for index in range(len(robots)):
+        if gone(team.faults, index):
+            continue
         precision = mission.maps.beliefs.precision[index]
-        for voxel in range(len(drivable) if not gone(team.faults, index) else 0):
+        for voxel in range(len(drivable)):
             if drivable[voxel] and precision[voxel] <= prior:
                 return False
     return True

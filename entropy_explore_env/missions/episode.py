@@ -27,7 +27,7 @@ from entropy_explore_env.worlds.splits import draw_world_number
 from entropy_explore_env.worlds.world import World
 
 _FILLED_WHOLE = ("truth", "collision", "mean", "precision")
-"""Arrays that a start fills with something else than zeros: worlds, and beliefs at the prior."""
+"""Arrays that a start fills with something other than zeros: worlds, and beliefs at the prior."""
 
 
 class FixedWorlds(NamedTuple):
@@ -134,7 +134,7 @@ def fill_start(scenario: Scenario, rules: Rules, state: MissionState, start: Sta
 
 
 def _set_seen_goal(scenario: Scenario, state: MissionState, mission: int, start: Start) -> None:
-    """Return what can be seen, from places within reach where that ends the mission, and how much must be."""
+    """Write what can be seen, from places within reach where that ends the mission, and how much must be."""
     clock, ending, world = state.missions[mission], scenario.ending, start.world
     by_seen = ending.by_seen
     visible = visible_from(world, scenario, start.poses) if by_seen else world.visible(scenario)

@@ -122,7 +122,7 @@ def apart(landmarks, slot, point, apart_m):
 
 @lean_kernel
 def voxel_behind(params, point, direction):
-    """Return number of the voxel in the workspace that begins where a ray has ended.
+    """Return the number of the voxel in the workspace that begins where a ray has ended.
 
     Args:
         params: PARAMS of the robot.

@@ -247,7 +247,7 @@ def choice_into_world(estimate, params, robot, choice, time_s):
 
 @lean_kernel
 def measure(localization, scan, sensor, scene, pose, rng):
-    """Return what a robot's sensor measures from where it truly is: all of a scan only if no robot drifts."""
+    """Measure from where a robot truly is: a whole scan, or where robots drift its ranges alone."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         take_scan(scan, sensor, scene, pose, rng)
         return

@@ -84,12 +84,12 @@ MISSION = ranged_type(
         # of the joint map, where the truth is tracked
         ("joint_bits", "f8", SIGNED),  # its entropy
         ("explored", "i8", _VOXELS),  # voxels measured at all
-        ("explored_visible", "i8", _VOXELS),  # of those that can be seen from where robots can be
+        ("explored_visible", "i8", _VOXELS),  # explored voxels that can be seen from where robots can be
         ("error", "f8", Values(-ROUNDING, "voxels")),  # sum of |expected - true coverage| over explored ones
         ("wrong", "i8", _VOXELS),  # explored voxels on the wrong side of ½
         ("visible", "i8", _VOXELS),  # voxels that can be seen from where robots can be
-        ("visible_free", "i8", _VOXELS),  # of those that are free
-        ("explored_free", "i8", _VOXELS),  # of those that were measured
+        ("visible_free", "i8", _VOXELS),  # visible voxels that are free
+        ("explored_free", "i8", _VOXELS),  # visible free voxels that were measured
         # when each share of SEEN_MARKS of what is visible was explored, and what the team had driven then;
         # -1 = not yet
         ("seen_s", "f8", PAST_OR_NEVER, (len(SEEN_MARKS),)),
@@ -99,7 +99,7 @@ MISSION = ranged_type(
         ("explored_free_end", "i8", Values(-MAX_VOXELS, "voxels")),
         # since a scan showed something new, or since it was asked what is left:
         ("idle_scans", "i8", COUNT),  # the team's scans
-        ("idle_from_m", "f8", Values(-ROUNDING, MOST)),  # what the team had driven then
+        ("idle_from_m", "f8", Values(-ROUNDING, MOST)),  # what the team had driven when they began
     ],
 )
 
@@ -117,7 +117,7 @@ ROBOT = ranged_type(
         ("scan_pose", "f8", POSE, (5,)),  # pose of the latest scan
         # points to which it meant to drive straight, one after the other
         ("path", "f8", FAR_PLACE, (WAYPOINTS, 3)),
-        ("waypoints", "i8", Values(0, WAYPOINTS)),  # how many there are; 0 = straight to the target
+        ("waypoints", "i8", Values(0, WAYPOINTS)),  # points of the path; 0 = straight to the target
         # code of a MoveEnd: how a planned drive ends if nothing stops it
         ("path_end", "i8", Values(0, len(MoveEnd) - 1)),
         ("corners", "i8", Values(0, WAYPOINTS)),  # how many of the points the drive passes before its goal
@@ -176,7 +176,7 @@ FAULT = ranged_type(
         ("blind_scans", "i8", COUNT),
         ("rays_lost", "i8", COUNT),
         ("messages_silenced", "i8", COUNT),  # per teammate not reached by a silent radio, and those not heard
-        ("messages_garbled", "i8", COUNT),  # that arrived so
+        ("messages_garbled", "i8", COUNT),  # that arrived garbled
         ("messages_repeated", "i8", COUNT),  # that arrived twice
         ("messages_late", "i8", COUNT),  # that were sent late
     ],

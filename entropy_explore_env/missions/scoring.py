@@ -61,15 +61,16 @@ def note_idle(clock, robots, idle):
         robots: (A,) ROBOT.
         idle: Whether the scan showed nothing new.
     """
-    clock.idle_scans += 1
-    if not idle:
+    if idle:
+        clock.idle_scans += 1
+    else:
         clock.idle_scans = 0
         clock.idle_from_m = driven_m(robots)
 
 
 @lean_kernel
 def driven_m(robots):
-    """Metres of the team's drives, those under way taken whole."""
+    """Return the metres of the team's drives, those under way taken whole."""
     total_m = 0.0
     for robot in robots:
         total_m += robot.distance_m

@@ -1,7 +1,7 @@
 """The state of many missions: NumPy arrays with leading axes mission E and robot A.
 
 What belongs to one mission, robot, pair of robots or message lies in the fields of structured
-arrays, so `state.robots["entropy_bits"]` is (E, A). Nothing else is carried from step to step:
+arrays, so `state.robots["entropy_bits"]` is (E, A). Kernels carry nothing else from step to step:
 pickle, deepcopy and replay follow from the arrays. Map frame, metres, radians, seconds, bits; a pose
 or viewpoint is (x, y, z, yaw, pitch).
 """

@@ -186,14 +186,14 @@ def _check_summaries(scenario: Scenario, arrays: Arrays) -> None:
 
 
 def _longest_m(scenario: Scenario) -> float:
-    """Return metres that no measured distance is beyond, noise and what is wrong with sensors included."""
+    """Return a distance that no measured one is beyond, noise and what is wrong with sensors included."""
     measured_m = _farthest_m(scenario) + 100.0 * max(kind.sensor.range_noise_m for kind in scenario.kinds)
     wrong = scenario.faults.sensor
     return measured_m * max(wrong.range_factor, 1.0) + abs(wrong.range_bias_m)
 
 
 def _farthest_m(scenario: Scenario) -> float:
-    """Return metres that no viewpoint is beyond the workspace, nor anything in it from anything else."""
+    """Return a distance: no viewpoint is farther outside the workspace, no two points in it are."""
     across_m = float(np.linalg.norm(scenario.grid.size_m)) + scenario.grid.voxel_size_m
     reaches_m = [kind.robot.reach_m for kind in scenario.kinds if math.isfinite(kind.robot.reach_m)]
     return 2.0 * max([across_m, *reaches_m])

@@ -108,7 +108,7 @@ def send_summary(summaries, team, maps, clock, in_flight, index, length, recipie
 
 @lean_kernel
 def note_summary(team, recipients, sender, pose, sent_s, time_s, bits):
-    """Count a summary with those who take it in, and note where its sender was.
+    """Count a summary with the robots that take it in, and note where its sender was.
 
     Args:
         team: Team.
@@ -147,7 +147,7 @@ def pack_summary(summaries, slot, index, robots, length):
 
 @lean_kernel
 def receive_summary(summaries, team, maps, in_flight, slot):
-    """Let a delayed summary arrive: its recipients fuse it; its slot is free again.
+    """Deliver a delayed summary: its recipients fuse it; its slot is free again.
 
     Args:
         summaries: TeamSummaries, or None.
@@ -185,7 +185,7 @@ def latest_precision(localization, index, voxel_size_m):
 
 @lean_kernel
 def sent_precision(localization, covariances, slot, voxel_size_m):
-    """Return the same by the covariance beside a delayed message."""
+    """Return the most precision of a leaf by the covariance beside a delayed message."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return math.inf
     return precision_of_place(covariances[slot], voxel_size_m)
@@ -205,7 +205,7 @@ def precision_of_place(packed, voxel_size_m):
 
 @lean_kernel
 def hear_summary(tree, team, maps, recipients, length, most):
-    """Fuse a summary into the beliefs of those who hear it, leaf by leaf, as a teammate's measurements.
+    """Fuse a summary into the beliefs of the robots that hear it, leaf by leaf, as a teammate's measurements.
 
     Args:
         tree: Tree, the summary in its data.

@@ -35,7 +35,7 @@ So paths of equal length compare equal, and ties do not depend on rounding.
 """
 
 _MOST_OFFSETS = 1 << 21
-"""Of a body's footprint, in the box around it: one of 64 voxels' radius in 3-D, of 700 in a plane."""
+"""Most voxels of the box around a body's footprint: a radius of 64 voxels in 3-D, of 700 in a plane."""
 
 _BLOCK_VOXELS = 32
 """Voxels that are classified together: it takes little more time than one, and most are needed soon."""
@@ -99,7 +99,7 @@ class Costs(NamedTuple):
 
 
 def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: int | None = None) -> Lattice:
-    """Return steps of a ball-shaped body in a workspace.
+    """Return the steps of a ball-shaped body in a workspace.
 
     A diagonal step is possible only if every voxel at the edges that it crosses is passable. The body fits
     where its footprint contains no covered voxel, as in `World.collision_mask`. Outside the workspace
@@ -111,7 +111,7 @@ def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: in
         layer: The only voxel layer that is searched (planar robots); None = all of them.
 
     Raises:
-        SettingError: The radius is no finite number ≥ 0 or too large, or there is no such layer.
+        SettingError: The radius is not a finite number ≥ 0 or is too large, or there is no such layer.
     """
     if not (0.0 <= body_radius < math.inf):
         raise SettingError("body_radius", body_radius, "a finite number ≥ 0, in voxel edges")

@@ -186,14 +186,14 @@ def _candidate_parts(scenario: Scenario) -> dict[str, tuple[tuple[int, ...], flo
 
 
 def action_count(scenario: Scenario, rules: Rules) -> int:
-    """Return number of actions where they are numbers."""
+    """Return the number of actions where they are numbers."""
     if scenario.action.kind == "candidates":
         return scenario.action.candidates
     return len(rules.actions.moves) * len(rules.actions.gazes)
 
 
 def _most_utility_bits(scenario: Scenario, rules: Rules) -> float:
-    """More than any ray can bring: the longest one, over voxels that was never measured."""
+    """More than any ray can bring: the longest one, over voxels that were never measured."""
     most, prior = 0.0, float(rules.params[0]["prior_precision"])
     for kind in scenario.kinds:
         length = kind.sensor.max_range_m / scenario.grid.voxel_size_m
