@@ -21,7 +21,6 @@ from entropy_explore_env import (
     CallOrderError,
     EntropyExploreEnv,
     SettingError,
-    env,
     environment_id,
     find_scenario,
     parallel_env,
@@ -76,23 +75,6 @@ def test_made_by_id_or_by_name_or_by_scenario_plays_the_same() -> None:
     by_name = played(parallel_env(BOX, **QUICK))
     require_same("id", leaves(by_name), leaves(played(made.unwrapped)))
     require_same("scenario", leaves(by_name), leaves(played(EntropyExploreEnv(SCENARIOS[BOX], **QUICK))))
-
-
-def test_taking_turns_plays_the_same_as_acting_together() -> None:
-    turns, together = env(BOX, robots=3, **QUICK), parallel_env(BOX, robots=3, **QUICK)
-    turns.reset(seed=7)
-    first = together.reset(seed=7)
-    rng = np.random.default_rng(1)
-    for agent in together.agents:
-        require_same("reset", leaves(first[0][agent]), leaves(turns.observe(agent)))
-    while together.agents:
-        actions = team_actions(together, rng)
-        rewards = together.step(actions)[1]
-        for agent in actions:
-            assert turns.agent_selection == agent
-            turns.step(actions[agent])
-        assert turns.rewards == rewards
-    assert all(turns.truncations.values())
 
 
 def test_the_mission_ends_for_all_robots_together_when_a_map_is_known() -> None:
@@ -315,33 +297,6 @@ def test_state_and_picture_want_a_reset() -> None:
         team.render()
     with pytest.raises(CallOrderError):
         team.state()
-
-
-def test_bad_actions_of_robots_that_take_turns_are_refused_at_once() -> None:
-    turns = env(BOX, robots=2)
-    turns.reset(seed=0)
-    for bad in (np.full(5, np.nan, np.float32), None, np.zeros(4, np.float32)):
-        with pytest.raises(ActionError, match="robot_0"):
-            turns.step(bad)
-        assert turns.agent_selection == "robot_0"
-    assert turns.view("robot_1").robot == 1
-
-
-def test_turns_out_of_order_are_refused() -> None:
-    turns = env(BOX, robots=2, max_cycles=1)
-    action = np.zeros(5, np.float32)
-    with pytest.raises(CallOrderError, match="before reset"):
-        turns.step(action)
-    turns.reset(seed=0)
-    turns.step(action)
-    turns.step(action)
-    assert turns.truncations == {"robot_0": True, "robot_1": True}
-    with pytest.raises(ActionError, match="None after the mission's end"):
-        turns.step(action)
-    turns.step(None)
-    turns.step(None)
-    with pytest.raises(CallOrderError, match="after the mission's end"):
-        turns.step(None)
 
 
 @pytest.mark.parametrize("scenario", SMALL)

@@ -21,12 +21,17 @@ EDGES_M = EDGE_M * (WIDE + DEEP + 1)
 STARTS = np.array([[0.35, 0.25, 0.05, 0.0, 0.0], [0.35, 0.65, 0.05, 0.0, 0.0]])
 
 
-def rooms(gap=1, **settings):
-    """Two robots in the left of two rooms; through the gap fits a beam, and no body."""
+def two_rooms():
+    """A world of two rooms; through the gap between them fits a beam, and no body."""
     solid = np.zeros((WIDE, DEEP, 1), bool)
     solid[12] = True
-    solid[12, 4 : 4 + gap] = False
-    world = World(Grid(solid.shape, EDGE_M), solid, "rooms")
+    solid[12, 4] = False
+    return World(Grid(solid.shape, EDGE_M), solid, "rooms")
+
+
+def rooms(**settings):
+    """Two robots in the left one of two rooms."""
+    world = two_rooms()
     changes = {"robots": 2, "robot": {"body_radius_m": 0.14}, "ending": {"seen_share": 1.0}}
     missions = Missions(
         in_given_worlds(with_settings(SCENARIOS["office"], {**changes, **settings}), [world]), given=(world,)
@@ -96,12 +101,8 @@ def test_a_team_that_has_seen_enough_goes_on_to_share_it():
 
 
 def test_an_environment_cuts_the_mission_off_and_says_why():
-    solid = np.zeros((WIDE, DEEP, 1), bool)
-    solid[12] = True
-    solid[12, 4] = False
-    world = World(Grid(solid.shape, EDGE_M), solid, "rooms")
     env = EntropyExploreEnv(
-        "office", world=world, robots=1, robot={"body_radius_m": 0.14}, ending={"seen_share": 1.0}
+        "office", world=two_rooms(), robots=1, robot={"body_radius_m": 0.14}, ending={"seen_share": 1.0}
     )
     env.reset(seed=0, options={"starts": STARTS[:1]})
     for step in range(400):  # to and fro along the wall

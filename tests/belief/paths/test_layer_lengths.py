@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import dijkstra
 from entropy_explore_env.belief.paths.lattice import field_costs, new_lattice
 from entropy_explore_env.belief.paths.layer_lengths import fill_layer_lengths
 from entropy_explore_env.belief.paths.search import cost_to, new_search
-from tests.belief.paths.test_planning import all_costs, graph_of
+from tests.belief.paths.graphs import all_costs, graph_of
 from tests.reference.scenes import drawn, seeds
 
 SQRT2 = math.sqrt(2.0)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, belief_costs, field_costs, new_lattice
@@ -24,63 +23,12 @@ from entropy_explore_env.belief.paths.search import costs_to_all, new_search
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World
+from tests.belief.paths.graphs import KNOWN, PRIOR, UNKNOWN, all_costs, graph_of, known, plan, random_rates
 from tests.reference.scenes import SHAPES, drawn, flat_index, random_cover, seeds
 
 SIZE = (7, 11, 5)
 FLAT = (9, 6, 1)
-PRIOR = 1.0 / 900.0
-KNOWN, UNKNOWN = 100.0, PRIOR
 SQRT2, SQRT3 = math.sqrt(2.0), math.sqrt(3.0)
-
-
-def graph_of(rates, layer=None):
-    """Steps between neighbours, (V, V) sparse: none past a corner that is impassable."""
-    shape, edges = rates.shape, {}
-    for voxel in np.ndindex(*shape):
-        for step in itertools.product((-1, 0, 1), repeat=3):
-            near = tuple(np.add(voxel, step).tolist())
-            if not any(step) or not all(0 <= n < size for n, size in zip(near, shape, strict=True)):
-                continue
-            if layer is not None and (voxel[2] != layer or step[2] != 0):
-                continue
-            passed = itertools.product(*({0, axis} for axis in step))
-            if all(math.isfinite(rates[tuple(np.add(voxel, part).tolist())]) for part in passed):
-                rate = 0.5 * (float(rates[voxel]) + float(rates[near]))
-                edges[np.ravel_multi_index(voxel, shape), np.ravel_multi_index(near, shape)] = (
-                    math.dist(voxel, near) * rate
-                )
-    rows, columns = zip(*edges, strict=True) if edges else ((), ())
-    return csr_matrix((list(edges.values()), (rows, columns)), shape=(rates.size, rates.size))
-
-
-def random_rates(shape, seed, decades, walls=0.25):
-    rng = np.random.default_rng(seed)
-    rates = (10.0 ** rng.uniform(-decades, decades, shape)).astype(np.float32)
-    rates[rng.random(shape) < walls] = math.inf
-    rates.ravel()[rng.integers(rates.size)] = 1.0
-    return rates
-
-
-def known(covered):
-    """Mean and precision of a belief that is sure of everything."""
-    return covered.astype(np.float32), np.full(covered.shape, KNOWN, np.float32)
-
-
-def all_costs(search, lattice, costs, sources, max_cost=math.inf):
-    """(X, Y, Z) costs of the paths from the nearest of some voxels."""
-    cost = np.empty(lattice.size)
-    search_paths(search, lattice, costs, np.array(sources, np.int32), ANY_GOAL, float(max_cost))
-    costs_to_all(search, cost.reshape(-1))
-    return cost
-
-
-def plan(mean, precision, start, goal, radius=0.0, layer=None, unknown_cost=1.0, max_cost=math.inf):
-    """Cost and voxels (N, 3) of a path through a belief."""
-    costs = belief_costs(mean, precision, PRIOR, unknown_cost)
-    lattice = new_lattice(mean.shape, radius, layer)
-    ends = flat_index([start, goal], mean.shape)
-    cost, path = shortest_path(new_search(mean.size), lattice, costs, *ends, max_cost)
-    return cost, np.stack(np.unravel_index(path, mean.shape), axis=-1)
 
 
 @drawn(60)
