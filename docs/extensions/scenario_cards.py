@@ -373,7 +373,7 @@ def _changes(part: Any) -> str:  # noqa: ANN401 - any settings
 
 
 def _film(name: str, docs: Path) -> str:
-    """Return the film of a mission, if there is one, and its strategy if another one is recommended."""
+    """Return the film of a mission, if there is one."""
     if not (docs / FILMS / f"{name}.webp").exists():
         return ""
     return f"![A mission in {name}](../{FILMS}/{name}.webp)\n"

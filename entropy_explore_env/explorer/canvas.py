@@ -22,12 +22,13 @@ class Canvas:
     Attributes:
         grid: The voxels, in the canvas's frame.
         yaw_rad: Rotation of that frame against the map frame.
+        prior_precision: Precision of voxels of which nothing is known.
         mean, precision: (X, Y, Z) float32.
     """
 
-    def __init__(self, grid: Grid, yaw_rad: float, prior_precision: float) -> None:
+    def __init__(self, grid: Grid, yaw_rad: float, prior_precision: float | np.float32) -> None:
         """Nothing is known yet."""
-        self.grid, self.yaw_rad = grid, yaw_rad
+        self.grid, self.yaw_rad, self.prior_precision = grid, yaw_rad, np.float32(prior_precision)
         self.mean = np.full(grid.shape, PRIOR_MEAN, np.float32)
         self.precision = np.full(grid.shape, prior_precision, np.float32)
 
@@ -41,11 +42,16 @@ class Canvas:
         """Return whether the voxels from `low` up to but without `high`, each (3,), lie in the grid."""
         return bool((low >= 0).all() and (high <= self.grid.shape).all())
 
-    def grown(self, low: np.ndarray, high: np.ndarray, prior_precision: float) -> Canvas:
+    @property
+    def known(self) -> np.ndarray:
+        """(X, Y, Z) bool, which voxels were measured or are known from a map."""
+        return np.asarray(self.precision > self.prior_precision)
+
+    def grown(self, low: np.ndarray, high: np.ndarray) -> Canvas:
         """Return a canvas of the voxels from `low` up to `high` of this lattice that knows the same."""
         grid = self.grid
         origin = np.asarray(grid.origin_m) + low * grid.voxel_size_m
-        bigger = Canvas(grid_of(high - low, grid.voxel_size_m, origin), self.yaw_rad, prior_precision)
+        bigger = Canvas(grid_of(high - low, grid.voxel_size_m, origin), self.yaw_rad, self.prior_precision)
         first, last = np.maximum(low, 0), np.minimum(high, grid.shape)
         mine = tuple(slice(a, max(a, b)) for a, b in zip(first, last, strict=True))
         theirs = tuple(slice(a, max(a, b)) for a, b in zip(first - low, last - low, strict=True))

@@ -112,12 +112,12 @@ class Ground:
         """
         if canvas.holds(*box) and (self._fixed or canvas.holds(*self._with_margin(box, layers, 1))):
             return np.zeros(3, np.int64)
-        known = box_of(canvas.precision > np.float32(self._prior))
+        known = box_of(canvas.known)
         if known is not None:
             box = np.minimum(box[0], known[0]), np.maximum(box[1], known[1])
         low, high = self._with_margin(box, layers, 2)
         known_bits = canvas.grid.voxels * self._voxel_bits - self.entropy_bits
-        self._begin(canvas.grown(low, high, self._prior), known_bits)
+        self._begin(canvas.grown(low, high), known_bits)
         return low
 
     def room_for_scan(self, pose: np.ndarray, sensor: RangeSensor) -> None:

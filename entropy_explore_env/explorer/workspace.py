@@ -78,20 +78,18 @@ class Workspace:
 
     def is_wall(self, pose: np.ndarray) -> bool:
         """Return whether the voxel of a pose was measured, and is believed covered."""
-        voxel, prior = self.voxel_of(pose), np.float32(self.scenario.sigma_prior**-2)
+        voxel, canvas = self.voxel_of(pose), self.canvas
         if voxel is None:
             return True
-        return bool(self.canvas.mean[voxel] > 0.5 and self.canvas.precision[voxel] > prior)
+        return bool(canvas.mean[voxel] > 0.5 and canvas.precision[voxel] > canvas.prior_precision)
 
     def beside_unknown(self) -> bool:
         """Return whether some voxel that is believed free shares a face with one that was never measured."""
-        prior = np.float32(self.scenario.sigma_prior**-2)
-        known = self.canvas.precision > prior
-        free = known & (self.canvas.mean <= 0.5)
+        unknown = ~self.canvas.known
+        free = ~unknown & (self.canvas.mean <= 0.5)
         for axis in range(3):
-            before = tuple(slice(None, -1) if other == axis else slice(None) for other in range(3))
-            after = tuple(slice(1, None) if other == axis else slice(None) for other in range(3))
-            if (free[before] & ~known[after]).any() or (free[after] & ~known[before]).any():
+            here, beside = np.moveaxis(free, axis, 0), np.moveaxis(unknown, axis, 0)
+            if (here[:-1] & beside[1:]).any() or (here[1:] & beside[:-1]).any():
                 return True
         return False
 

@@ -200,6 +200,7 @@ def animate(frames: Iterable[np.ndarray], path: Path, frame_s: float) -> None:
     if not packed:
         raise SettingError("frames", "none", "at least one picture")
     palette, nearest = shared_palette(usage)
+    webp = path.suffix.lower() == ".webp"
 
     def pictures() -> Iterator[Image.Image]:
         for data in packed:
@@ -208,7 +209,7 @@ def animate(frames: Iterable[np.ndarray], path: Path, frame_s: float) -> None:
             image.putpalette(palette.tobytes())
             yield image.convert("RGB") if webp else image
 
-    webp, animation = path.suffix.lower() == ".webp", pictures()
+    animation = pictures()
     options: dict[str, Any] = {"append_images": animation, "duration": round(1000 * frame_s), "loop": 0}
     options |= {"lossless": True, "method": 4} if webp else {"optimize": False}
     buffer = io.BytesIO()
