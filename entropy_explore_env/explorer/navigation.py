@@ -14,7 +14,8 @@ import numpy as np
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.explorer.explorer import Explorer
 from entropy_explore_env.explorer.goals import Goal
-from entropy_explore_env.interop.messages import pose_of
+from entropy_explore_env.interop.messages import ARROW_M, pose_of
+from entropy_explore_env.reports.colours import robot_colour
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.rotations import quaternion_of
 from entropy_explore_env.settings.robot import Robot
@@ -24,7 +25,6 @@ SUCCEEDED, CANCELED, ABORTED = 4, 5, 6
 """Statuses of action_msgs/GoalStatus at an action's end."""
 _ARROW, _ADD, _DELETE = 0, 0, 2
 """Type and actions of a visualization_msgs/Marker."""
-_COLOURS = ((0.0, 0.45, 0.7), (0.9, 0.6, 0.0), (0.0, 0.6, 0.5), (0.8, 0.4, 0.7))
 
 
 def move_end_of(status: int) -> MoveEnd:
@@ -48,8 +48,8 @@ def fill_marker(message: Any, goal: Goal | None, robot: int) -> Any:  # noqa: AN
     message.action = _DELETE if goal is None else _ADD
     if goal is not None:
         fill_pose(message.pose, goal.viewpoint)
-    message.scale.x, message.scale.y, message.scale.z = 0.6, 0.12, 0.12
-    red, green, blue = _COLOURS[robot % len(_COLOURS)]
+    message.scale.x, message.scale.y, message.scale.z = ARROW_M
+    red, green, blue = (channel / 255.0 for channel in robot_colour(robot))
     message.color.r, message.color.g, message.color.b, message.color.a = red, green, blue, 1.0
     return message
 

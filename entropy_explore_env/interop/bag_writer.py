@@ -20,7 +20,7 @@ from entropy_explore_env.belief.belief_map import Map
 from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.interop.map_files import octomap_of
-from entropy_explore_env.interop.messages import percent_of
+from entropy_explore_env.interop.messages import ARROW_M, percent_of
 from entropy_explore_env.interop.team_maps import joint_map
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.simulation import Missions
@@ -212,7 +212,7 @@ class BagWriter:
             "type": 0,
             "action": 0,
             "pose": self._pose(own["target"]),
-            "scale": self._vector(0.6, 0.12, 0.12),
+            "scale": self._vector(*ARROW_M),
             "lifetime": moment,
             "frame_locked": False,
             "points": [],

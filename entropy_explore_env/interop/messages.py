@@ -14,6 +14,8 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.robots.rotations import gaze_of, quaternion_matrix
 from entropy_explore_env.worlds.files.voxels import FREE, SOLID
 
+ARROW_M = (0.6, 0.12, 0.12)
+"""Length, width and height of the arrow at a robot's goal."""
 _LEVEL = 1e-3
 """Largest x and y of the quaternion of a map that lies level."""
 
