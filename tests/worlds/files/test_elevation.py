@@ -217,10 +217,10 @@ def test_heights_are_scaled_and_offset_as_gdal_has_it(tmp_path):
     path.write_bytes(geotiff(counts, tags=[metadata]))
     world = load_world(path)
     np.testing.assert_array_equal(world.occupied.sum(axis=2), expected(counts / 100 + 10.0, 1.0))
-    path.write_bytes(
-        geotiff(heights(), tags=[(42112, "s", 0, GDAL.format("unittype", "ftUS", "z", ""), True)])
-    )
-    assert load_world(path).grid.origin_m[2] == pytest.approx(float(heights().min()) * SURVEY_FOOT - 1.0)
+    feet = [(42112, "s", 0, GDAL.format("unittype", "ftUS", "z", ""), True)]
+    for data in (geotiff(heights(), tags=feet), keyed((4096, 2), tags=feet)):  # no system needs to be known
+        path.write_bytes(data)
+        assert load_world(path).grid.origin_m[2] == pytest.approx(float(heights().min()) * SURVEY_FOOT - 1.0)
     path.write_bytes(
         geotiff(heights(), tags=[(42112, "s", 0, GDAL.format("unittype", "fathom", "z", ""), True)])
     )
