@@ -55,6 +55,7 @@ from entropy_explore_env.settings.validation import check_whole, is_number
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.writing import write_atomically
 from training.evaluate import task_of  # which says what is missing without the extra
+from training.slope import Pairs, shrunk_slope
 from training.validation import pair_seeds
 
 SEARCHED = (
@@ -69,10 +70,8 @@ _LIMIT_S = 2000.0
 """Time limit of missions: longer ones would teach little and take all the time."""
 _LEAST_SPREAD, _NO_SPREAD = 0.03, 1e-6
 _SPREAD_MISSIONS = 2
-_OLDER = 0.5
 _LAST_STEP = 0.3
 """Length of the last step, as a share of the first one's."""
-_RIDGE = 1.0
 _SPREADS = "spreads"
 _STOPPED = "pairs that are done are kept, those under way are run again"
 
@@ -347,59 +346,6 @@ class Search:
         found = np.array([known[name] for name in names])
         logs, finished = np.log(found[:, :2]), float(found[:, 2].mean()) / 2.0
         return Pairs(directions, 0.5 * (logs[:, 0] - logs[:, 1]), logs.mean(axis=1), finished)
-
-
-class Pairs(NamedTuple):
-    """What N pairs of one task and round came to."""
-
-    directions: np.ndarray
-    """(N, S) e."""
-    slopes: np.ndarray
-    """(N,) y."""
-    ln_times: np.ndarray
-    """(N,) mean of both logarithms of seconds."""
-    finished: float = 1.0
-    """Share of the missions that came to what they ask for."""
-
-
-def shrunk_slope(history: Sequence[Sequence[Pairs]]) -> tuple[np.ndarray, float]:
-    """Return the slope g from the pairs of all rounds so far, of which the latest count most.
-
-    Args:
-        history: Of each round a Pairs for each task.
-
-    Returns:
-        (S,) g, shrunk towards zero as far as it is uncertain; and how long it should be without that, 0 where
-        it is no longer than chance makes it on average.
-    """
-    tasks = len(history[-1])
-    slope, covariance = np.zeros(len(SEARCHED)), np.zeros((len(SEARCHED), len(SEARCHED)))
-    for task in range(tasks):
-        parts = [parts[task] for parts in history]
-        directions = np.concatenate([part.directions for part in parts])
-        slopes = np.concatenate([part.slopes for part in parts])
-        ages = np.repeat(np.arange(len(parts))[::-1], [len(part.slopes) for part in parts])
-        own, uncertain = _least_squares(directions, slopes, _OLDER**ages)
-        slope, covariance = slope + own / tasks, covariance + uncertain / tasks**2
-    size = len(slope)
-    variance = max(float(slope @ slope - np.trace(covariance)) / size, 0.0)
-    if variance == 0.0:
-        return np.zeros(size), 0.0
-    shrunk = variance * np.linalg.solve(variance * np.eye(size) + covariance, slope)
-    return shrunk, math.sqrt(size * variance)
-
-
-def _least_squares(
-    directions: np.ndarray, slopes: np.ndarray, weights: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the slope (S,) that fits best, and its covariance (S, S)."""
-    size = directions.shape[1]
-    weighted = directions.T * weights
-    inverse = np.linalg.inv(weighted @ directions + _RIDGE * np.eye(size))
-    leaves = np.eye(len(slopes)) - directions @ inverse @ weighted  # what is left over, from what there was
-    left, freedom = leaves @ slopes, float((weights[:, None] * leaves**2).sum())
-    noise = float(weights @ left**2) / max(freedom, 1e-9)
-    return inverse @ (weighted @ slopes), noise * inverse @ (weighted * weights) @ directions @ inverse
 
 
 if __name__ == "__main__":

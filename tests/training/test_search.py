@@ -11,7 +11,8 @@ import pytest
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED
 from entropy_explore_env.planner.weights import read_weights
 from training import search as searching
-from training.search import SEARCHED, Pairs, main, run_command, shrunk_slope
+from training.search import SEARCHED, main, run_command
+from training.slope import Pairs, _least_squares, shrunk_slope
 
 SIZE = len(SEARCHED)
 TINY = "--tasks box-7x11x5:2 box-7x11x5:1 --candidates 6 --rounds 2 --pairs 3 --sigma 1.0 --seed 4 --jobs 1"
@@ -59,7 +60,7 @@ def test_the_covariance_of_the_slope_is_that_of_repeats(ages):
     directions = np.random.default_rng(9).standard_normal((len(weights), SIZE))
     for seed in range(600):
         noise = np.random.default_rng(seed).standard_normal(len(weights))
-        slope, covariance = searching._least_squares(directions, directions @ true + 0.05 * noise, weights)
+        slope, covariance = _least_squares(directions, directions @ true + 0.05 * noise, weights)
         found.append(slope)
         told.append(covariance)
     repeated = np.cov(np.array(found).T)
