@@ -204,7 +204,7 @@ class Tanh(nn.Module):
     """The hyperbolic tangent, fast on CPUs."""
 
     def forward(self, x: torch.Tensor) -> torch.Tensor:
-        """Of any shape."""
+        """Return the hyperbolic tangent of values of any shape."""
         return _Logistic.apply(x)  # pyright: ignore[reportReturnType]
 
 

@@ -349,7 +349,7 @@ def main(words: Sequence[str]) -> int:
 
 
 def set_up(args: Args, task: TrainingTask) -> TrainingState:
-    """Missions to learn from, and PPO with fresh weights."""
+    """Set up missions to learn from, and PPO with fresh weights."""
     around = task.surroundings.settings()
     if args.reward == "seconds":
         around["reward_function"] = less_the_seconds
@@ -484,7 +484,7 @@ class DecisionPPO(PPO):
     def _collect(
         self, env: RobotVecEnv, callback: BaseCallback, rollout_buffer: DecisionBuffer, steps: int
     ) -> bool:
-        """As `collect_rollouts`."""
+        """Fill the buffer as `collect_rollouts` does."""
         self.policy.set_training_mode(False)
         rollout_buffer.reset()
         callback.on_rollout_start()

@@ -172,7 +172,7 @@ def main(words: Sequence[str]) -> int:
 
 
 def _where(folder: Path) -> str:
-    """From where a run goes on."""
+    """Return where a run continues, as the end of a message."""
     checkpoint = last_checkpoint(folder)
     if checkpoint is None:
         return "no checkpoint: from the beginning"

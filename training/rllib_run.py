@@ -209,7 +209,7 @@ def check_address(address: str | None) -> None:
 
 
 def start_ray(address: str | None, runners: int) -> Any:  # noqa: ANN401 - a module that may not be there
-    """Ray, started on this machine or joined at an address.
+    """Start Ray on this machine, or join it at an address; return the module.
 
     Args:
         address: HOST:PORT of a cluster, `auto` for the one that this machine belongs to, or None for this

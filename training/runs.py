@@ -179,7 +179,7 @@ def resumed_options(
 
 
 def _flat(options: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Options in options by their names on the command line, `channel.burst`."""
+    """Return nested options by their names on the command line, such as `channel.burst`."""
     flat: dict[str, Any] = {}
     for name, value in options.items():
         inside = prefix if name in _INLINE else f"{prefix}{name}."
@@ -279,7 +279,7 @@ def restore_state(state: TrainingState, checkpoint: Checkpoint) -> None:
 
 
 def _restore_trainer(state: TrainingState, checkpoint: Checkpoint) -> None:
-    """Everything but the policy's weights."""
+    """Restore everything but the policy's weights."""
     model, buffer, trainer = state.model, state.buffer, checkpoint.trainer
     if trainer is None:
         raise LookupError("no trainer's state")

@@ -43,7 +43,7 @@ class Claim:
     claim: str = ""
 
     def row(self) -> dict[str, Any]:
-        """As JSON has it."""
+        """Return the claim as JSON has it."""
         return {name: getattr(self, name) for name in COLUMNS}
 
 

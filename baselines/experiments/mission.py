@@ -48,7 +48,7 @@ class Surroundings:
     decision_period_s: float | None = None
 
     def settings(self) -> dict[str, Any]:
-        """As an environment takes them."""
+        """Return the settings as an environment takes them."""
         fixed = {"every_reset": json.loads(self.every_reset)} if self.every_reset else {}
         return {**(json.loads(self.worlds) if self.worlds else {}), **fixed}
 

@@ -297,7 +297,7 @@ def _sensor(rng: np.random.Generator, part: Callable[..., Any]) -> RangeSensor:
 
 
 def _faults(rng: np.random.Generator, part: Callable[..., Any], robots: int) -> Faults:
-    """Nothing goes wrong in half of the scenarios; else each part may, of some robots or of all."""
+    """Return faults: none in half of the scenarios, else each part may fail, of some robots or of all."""
 
     def some() -> tuple[int, ...]:
         number = int(rng.integers(0, min(robots, 3) + 1))
@@ -327,7 +327,7 @@ def _fiducials(rng: np.random.Generator, part: Callable[..., Any], grid: Grid) -
 
 
 def _channel(part: Callable[..., Any], faulty: bool, few_kernels: bool) -> Channel:
-    """Return a channel; with few kernels it reaches by more than distance only where there are faults."""
+    """Return a channel; with few kernels it is limited by more than distance only where there are faults."""
 
     def fitting(**drawn: Any) -> Channel:  # noqa: ANN401 - whatever a setting is
         if drawn["burst"] == 0 or (few_kernels and not faulty):
@@ -363,7 +363,7 @@ def _observation(
 
 
 def _world(rng: np.random.Generator, grid: Grid) -> World:
-    """Solid voxels drawn one by one, in half of the cases under a ceiling."""
+    """Draw solid voxels one by one, in half of the cases under a ceiling."""
     solid = rng.random(grid.shape) < rng.choice([0.02, 0.1, 0.3])
     ceiling = None
     if rng.random() < 0.5:

@@ -56,7 +56,7 @@ class Saved(NamedTuple):
 
 
 def another_value(data: bytes, rng: np.random.Generator) -> bytes:
-    """JSON with one value replaced by one of another kind or size."""
+    """Replace one value of JSON by one of another kind or size."""
     try:
         content = json.loads(data)
     except ValueError:
@@ -76,7 +76,7 @@ def another_value(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 def another_array(data: bytes, rng: np.random.Generator) -> bytes:
-    """Return an archive with one array of another shape or type, with other numbers, or gone."""
+    """Remove one array of an archive, or change its shape, type or numbers."""
     try:
         with np.load(io.BytesIO(data)) as archive:
             arrays = dict(archive)

@@ -85,7 +85,7 @@ def change(number: int) -> tuple[str, str]:
 
 
 def _all_of(missions: Missions) -> list[Any]:
-    """Everything that a refused state must leave as it was."""
+    """Return everything that a refused state must leave as it was."""
     digests = [state_digest(missions, mission) for mission in range(missions.count)]
     worlds, truth = missions.worlds[:], missions.state.truth.tobytes()
     return [digests, worlds, truth, missions.seeds[:], missions.episodes[:], missions.observations.tobytes()]

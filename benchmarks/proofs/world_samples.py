@@ -178,7 +178,7 @@ def glb_of_json(gltf: dict[str, Any], blob: bytes = b"") -> bytes:
 
 
 def samples() -> dict[str, list[Sample]]:
-    """By loader: files of every kind that it reads."""
+    """Return loader → files of every kind that it reads."""
     cell = {"voxel_size_m": 0.5}
     deep = (plan().astype(np.uint16) * 200).astype(np.uint16)
     return {

@@ -88,10 +88,8 @@ def cost_graph(costs_per_cell: np.ndarray, length_cost: float = 0.0, by_length: 
         by_length: Whether diagonal steps pay the costs_per_cell of their whole length.
     """
     size_x, size_y, _ = costs_per_cell.shape
-    plane, numbers = (
-        costs_per_cell[:, :, 0].astype(np.float64),
-        np.arange(costs_per_cell.size).reshape(size_x, size_y),
-    )
+    plane = costs_per_cell[:, :, 0].astype(np.float64)
+    numbers = np.arange(costs_per_cell.size).reshape(size_x, size_y)
     free, rows, columns, costs = np.isfinite(plane), [], [], []
 
     def moved(field: np.ndarray, x: int, y: int, by: tuple[int, int]) -> np.ndarray:

@@ -61,7 +61,7 @@ class Run:
         return {**fields, "rules": described(self.rules)}
 
     def run(self) -> Record:
-        """Carry it out: its record, and maps for its picture."""
+        """Carry it out, and return its record with maps for its picture."""
         occupied = self.plan()
         starts = start_cells(occupied, self.starts, self.robots, self.seed)
         simulation = Simulation(occupied, starts, self.rules, self.known, self.seed)

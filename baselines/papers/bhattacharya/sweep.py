@@ -122,7 +122,7 @@ def channel_id(channel: str, loss: float) -> str:
 
 
 def mission_cells(seeds: int, corridor: Path | None) -> list[Cell]:
-    """All cells.
+    """Return the cells of all missions, (e) and (f).
 
     Args:
         seeds: Missions of each flying team; four times as many of each channel.

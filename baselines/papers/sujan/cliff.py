@@ -30,6 +30,7 @@ from baselines.papers.sujan.cliff_mission import (
     start_of,
     steps_needed,
 )
+from entropy_explore_env.errors import counted
 
 _PAPER_RATIO, _PAPER_SHARE = 10.0, 0.5
 GROUPS = {
@@ -100,9 +101,7 @@ def _methods_table(records: Records) -> str:
 def _field_table(records: Records) -> str:
     """Return figs. 29, 31 and 32 in numbers: methods 3 and 5 over the first steps."""
     steps = sorted({1, 2, FEW // 2, FEW})
-    columns = {
-        f"fig. 29: new columns after {n} step{'s' * (n > 1)}": _columns_after(records, n) for n in steps
-    }
+    columns = {f"fig. 29: new columns after {counted(n, 'step')}": _columns_after(records, n) for n in steps}
 
     def left(cell: str) -> str:
         parts = [interest_in(records, part, FEW).mean() for part in ("unreadable", "readable")]

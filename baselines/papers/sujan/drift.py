@@ -116,7 +116,7 @@ def experiment(amount: Amount) -> list[CellTrial]:
 
 
 def task(level: str, margin_m: float, limit_s: float) -> Scenario:
-    """`cluttered` for one robot, until so much is seen, with drift of a level."""
+    """Return `cluttered` for one robot with drift of a level; it ends when a given share is seen."""
     factor = LEVELS[level]
     localization = Localization(
         xy_m_per_sqrt_m=factor * HIGH.xy_m_per_sqrt_m,

@@ -133,7 +133,7 @@ def scenario_of(robots: int) -> Scenario:
 
 
 def in_the_middle(robots: int) -> Surroundings:
-    """All missions start in the middle; two robots a metre apart."""
+    """Return the start of all missions: in the middle, two robots a metre apart."""
     middle = [0.5 * size for size in OCCLUSIONS.grid.size_m]
     places = [[middle[0] + robot - 0.5 * (robots - 1), *middle[1:], 0.0, 0.0] for robot in range(robots)]
     return Surroundings(every_reset=json.dumps({"starts": places}))

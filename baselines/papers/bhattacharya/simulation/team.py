@@ -71,7 +71,7 @@ class Planner:
     """A belief with the tessellation and the targets that follow from it."""
 
     def __init__(self, belief: GridBelief, rules: Rules, robots: int) -> None:
-        """Nothing is tessellated yet."""
+        """Begin with nothing tessellated."""
         self.belief, self.rules, self._robots = belief, rules, robots
         self.space, self._scratch = new_tessellation(belief.shape), new_tessellation(belief.shape)
         self.explored = False
@@ -225,7 +225,7 @@ class Simulation:
         return self.trace
 
     def step(self, functional: bool = True) -> bool:
-        """One iteration; False once all is explored and no robot has moved for long enough."""
+        """Run one iteration; return False once all is explored and no robot has moved for long enough."""
         trace, before = self.trace, sum(planner.tessellations for planner in self.planners)
         trace.places.append(self.places.tolist())
         if not self.known:
@@ -259,7 +259,7 @@ class Simulation:
         return self._last_heard_at[robot]
 
     def _scan_and_broadcast(self, iteration: int) -> None:
-        """All robots scan, and broadcast in phases where messages are not perfect."""
+        """Let all robots scan, and broadcast in phases where messages are not perfect."""
         robots = len(self.places)
         if iteration % self.rules.phase == 0 and len(self.planners) > 1:
             for robot in range(robots):  # swap the buffers
