@@ -131,7 +131,7 @@ class _Pickled:
 
 
 def hostile_yaml(data: bytes, rng: np.random.Generator) -> bytes:
-    """Insert tags that would run code, aliases that would grow, images that lie elsewhere, or deep nesting."""
+    """Insert tags that would run code, growing aliases, images that lie elsewhere, or deep nesting."""
     if b"image:" not in data[:4096]:
         return absurd_text(data, rng)
     bomb = b"a: &a [x, x, x, x, x, x, x, x, x]\n"
