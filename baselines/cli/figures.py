@@ -18,14 +18,21 @@ STYLE: Any = {"font.size": 9, "axes.spines.top": False, "axes.spines.right": Fal
 """Of all figures: matplotlib's settings."""
 
 
+DOTS_PER_INCH = 110
 _PALETTE = 256
 """Colours of a PNG: files are a third as large, and look the same."""
 
 
-def png(figure: Figure, dots_per_inch: int = 110) -> bytes:
+def png(figure: Figure) -> bytes:
     """Return the figure as a PNG file, the same bytes for the same figure."""
-    drawn, packed = io.BytesIO(), io.BytesIO()
-    figure.savefig(drawn, format="png", dpi=dots_per_inch, metadata={"Software": None})
-    picture = Image.open(drawn).convert("RGB").quantize(_PALETTE, dither=Image.Dither.NONE)
-    picture.save(packed, format="png", optimize=True)
+    drawn = io.BytesIO()
+    figure.savefig(drawn, format="png", dpi=DOTS_PER_INCH, metadata={"Software": None})
+    return packed_png(Image.open(drawn))
+
+
+def packed_png(picture: Image.Image) -> bytes:
+    """Return a picture as a PNG file of few colours."""
+    packed = io.BytesIO()
+    few = picture.convert("RGB").quantize(_PALETTE, dither=Image.Dither.NONE)
+    few.save(packed, format="png", optimize=True)
     return packed.getvalue()

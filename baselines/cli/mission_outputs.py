@@ -52,7 +52,7 @@ class Outputs:
     bag: Path | None = None
     """Folder for a ROS 2 bag of the mission, which must not exist (extra ros)."""
     truth: bool = False
-    """Show the true world beside the map in mission.png; needs --out."""
+    """Show the true world below the map in mission.png; needs --out."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -231,7 +231,8 @@ class MissionLog:
         content = {**figures, "settings": settings_of(recorder.missions.scenario), "series": series}
         write_atomically(folder / "mission.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
         strategy = shown_name(figures["strategy"])
-        picture = mission_picture(recorder, named(figures), strategy, self._wanted.outputs.truth)
+        end = self._painter.frame(recorder.missions)
+        picture = mission_picture(recorder, end, named(figures), strategy, self._wanted.outputs.truth)
         write_atomically(folder / "mission.png", picture)
         name = "map.yaml" if self._team_map.grid.flat else "map.npz"
         maps = save_map(self._team_map, folder / name)

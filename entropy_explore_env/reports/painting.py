@@ -110,16 +110,17 @@ class Painter:
         return {**self.__dict__, "_window": None}
 
     def paint(self, missions: Missions) -> np.ndarray:
-        """Draw this moment of the mission: the belief of robot_0, and the whole team.
+        """Draw this moment of the mission, (480, 640, 3) uint8; see `frame`."""
+        return draw_frame(self.frame(missions))
+
+    def frame(self, missions: Missions) -> Frame:
+        """Return what a picture shows of this moment: the belief of robot_0, and the whole team.
 
         Robots that drift are drawn where they believe they are, which is the map's frame, with an ellipse of
         two standard deviations and a line to where they are; the paths are those that they truly drove.
 
         Args:
             missions: The curves and the driven paths show the moments at which they were watched.
-
-        Returns:
-            (480, 640, 3) uint8.
         """
         robots = missions.state.robots[self._number]
         time_s = float(missions.state.missions[self._number]["time_s"])
@@ -138,7 +139,7 @@ class Painter:
             *((f"pose error {max(pose_errors(estimates))[0]:.2f} m at most",) if drifts else ()),
             *((f"stopped {stopped.sum()} of {len(robots)}",) if missions.scenario.faults.happen else ()),
         )
-        frame = Frame(
+        return Frame(
             entropy_share=entropy_share(missions, self._number, 0),
             coverage=missions.mean[self._number, 0],
             voxel_size_m=missions.grid.voxel_size_m,
@@ -157,7 +158,6 @@ class Painter:
             true_m=poses_now(missions, self._number)[:, :3] if drifts else np.zeros((0, 3)),
             fiducials_m=missions.state.fiducials[self._number],
         )
-        return draw_frame(frame)
 
     def close(self) -> None:
         """Close the window, if there is one."""
