@@ -13,7 +13,8 @@ every stop. What a robot is, and what its mission asks for, decides how it explo
 - The same robots where a part may stay unseen: bits per time, of unknown voxels alone.
 
 With learned weights (`planner.weights`) a robot chooses among several candidates of the same planner, in any
-mission.
+mission. Where robots return to their start, one that finds nothing worth a scan goes for the frontier cells
+that are left, and then home.
 """
 
 from __future__ import annotations
@@ -58,9 +59,10 @@ class PlannedRate:
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
-        weights = self.weights
+        weights, self._homeward = self.weights, set[int]()
         self._frontiers = [weights is None and explores_frontiers(scenario, kind) for kind in scenario.kinds]
-        if any(self._frontiers):
+        self._returns = scenario.ending.return_to_start
+        if any(self._frontiers) or self._returns:
             self._tours = SharedTour()
             self._tours.backs_off = False  # whatever the planner chooses is followed so
             self._tours.reset(scenario, rng)
@@ -71,9 +73,14 @@ class PlannedRate:
 
     def choose(self, view: RobotView) -> np.ndarray:
         """Return the viewpoint (5,) by the robot's own belief and what it has heard."""
-        if self._frontiers[view.robot % len(self._frontiers)]:
+        if self._goes_by_frontiers(view.robot):
             return self._tours.choose(view)
         proposed = self._proposer.propose(view)
+        if self._returns and view.ceiling is None:
+            self._tours.start_from(view)
+            if self._proposer.found_nothing(view.robot):
+                self._homeward.add(view.robot)
+                return self._tours.choose(view)
         if self.weights is None:
             return proposed[0].copy()
         features = self._proposer.features(view.robot)
@@ -82,6 +89,9 @@ class PlannedRate:
 
     def found_nothing(self, robot: int) -> bool:
         """Return whether nothing that is worth a drive was found for a robot at its latest decision."""
-        if self._frontiers[robot % len(self._frontiers)]:
+        if self._goes_by_frontiers(robot):
             return self._tours.found_nothing(robot)
         return self._proposer.found_nothing(robot)
+
+    def _goes_by_frontiers(self, robot: int) -> bool:
+        return self._frontiers[robot % len(self._frontiers)] or robot in self._homeward

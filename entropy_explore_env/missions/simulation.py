@@ -55,7 +55,7 @@ class Missions:
         worlds: The true world of each mission; None before its first reset.
         world_numbers: (E,) int64, its number in each mission; -1 where no recipe made it.
         options: What was given to the latest reset of each mission, instead of drawing it.
-        world_changed: Whether `set_world_block` has changed the world of each mission since its reset.
+        world_changes: Whether `set_world_block` was called for each mission since its reset.
         every_reset: What resets are given that say nothing of it, also where missions start by themselves.
         reward_function: Name of the function that rewards the robots in place of the scenario's reward, for
             records; empty = none. Missions themselves always reward by the scenario.
@@ -106,7 +106,7 @@ class Missions:
         self.reward_function = ""
         self._returning = Returning(self.count, scenario.robots) if scenario.ending.return_to_start else None
         self._changes: list[list[WorldChange]] = [[] for _ in range(self.count)]
-        self.world_changed = [False] * self.count
+        self.world_changes = [False] * self.count
         self.seeds = [0] * self.count
         self.episodes = [-1] * self.count
         self.observations = np.zeros((self.count, scenario.robots, self.layout.size), np.float32)
@@ -211,7 +211,7 @@ class Missions:
         mission, world = start.mission, start.world
         self.seeds[mission], self.episodes[mission] = start.seed, start.episode
         self.options[mission] = start.options
-        self._changes[mission], self.world_changed[mission] = [], False
+        self._changes[mission], self.world_changes[mission] = [], False
         self.world_numbers[mission] = -1 if start.world_number is None else start.world_number
         differs = world.ceiling is not None or world.unreadable is not None
         if differs and self.state.collision is self.state.truth:
@@ -270,10 +270,12 @@ class Missions:
         change = checked_change(self.grid, low_m, high_m, solid, now_s if at_s is None else float(at_s))
         if at_s is not None:
             self._changes[mission].append(change)
+            self.world_changes[mission] = True
         elif (robot := robot_in_the_way(self.rules, self.state, mission, change)) is not None:
             raise SettingError("low_m, high_m", (low_m, high_m), f"a box that robot {robot} does not touch")
         else:
             self._change(mission, change)
+            self.world_changes[mission] = True
 
     def _change(self, mission: int, change: WorldChange) -> None:
         """Change a mission's world now."""
@@ -281,7 +283,6 @@ class Missions:
         assert world is not None
         before = self.state.truth[mission].copy()
         self._set_world(mission, changed_world(world, change))
-        self.world_changed[mission] = True
         prior = float(self.rules.params["prior_precision"][0])
         rescore(self.state, mission, before, self.state.truth[mission], prior)
 

@@ -26,7 +26,12 @@ def snapshot(missions: Missions) -> dict[str, np.ndarray]:
         `episodes` (E,), `observations` (E, A, F) and the arrays of the MissionState, but for what the seeds
         say; and what the latest resets were given: `starts_e` (A, 5), `world_number_e` and `world_e` (the
         bytes that `save_world` writes) of a mission e.
+
+    Raises:
+        RecordError: A mission's world changes under way.
     """
+    for mission in range(missions.count):
+        check_world_stays(missions, mission)
     state = missions.state._asdict()
     kept = {name: array.copy() for name, array in state.items() if name not in FROM_WORLD}
     kept["seeds"] = np.array([str(seed) for seed in missions.seeds])
@@ -84,6 +89,12 @@ def restore(missions: Missions, arrays: Mapping[str, np.ndarray]) -> None:
         if name not in FROM_WORLD:
             array[...] = arrays[name]
     missions.observations[...] = observations
+
+
+def check_world_stays(missions: Missions, mission: int) -> None:
+    """Raise a RecordError if a mission's world changes under way: nothing would hold these changes."""
+    if missions.world_changes[mission]:
+        raise RecordError("mission", "its world changes under way", "one in a world that stays as it is")
 
 
 def _is_seed(seed: np.str_) -> bool:

@@ -145,8 +145,7 @@ class Driver(ABC):
             ActionError: The rule gave no place to which a robot can go.
         """
         trail = self._trails[view.robot]
-        if np.isnan(trail.home[0]):
-            trail.home = view.pose.copy()
+        self.start_from(view)
         self.observe(view)
         viewpoint = self._after_drive(view, trail)
         trail.follows = viewpoint is None or trail.waited
@@ -162,6 +161,12 @@ class Driver(ABC):
             viewpoint = self._backed_off(view, trail, viewpoint, self._back_off_rng)
         trail.viewpoint = viewpoint.copy()
         return viewpoint
+
+    def start_from(self, view: RobotKnowledge) -> None:
+        """Note where a robot started, unless that was noted before."""
+        trail = self._trails[view.robot]
+        if np.isnan(trail.home[0]):
+            trail.home = view.pose.copy()
 
     def _after_drive(self, view: RobotKnowledge, trail: Trail) -> np.ndarray | None:
         """Learn from how the latest drive ended; return a viewpoint where that alone decides."""

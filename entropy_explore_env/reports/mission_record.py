@@ -22,6 +22,7 @@ import numpy as np
 
 from entropy_explore_env.errors import CallOrderError, EntropyExploreError, RecordError, WorldError
 from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.missions.snapshot import check_world_stays
 from entropy_explore_env.reports.state_digest import named_digest, state_digest
 from entropy_explore_env.settings.json import scenario_of, settings_of
 from entropy_explore_env.settings.scenario import Scenario
@@ -149,12 +150,11 @@ class CommandRecorder:
 
         Raises:
             CallOrderError: The mission was never reset.
-            RecordError: Its world changed under way.
+            RecordError: Its world changes under way.
         """
         missions = self._missions
         missions.check_begun("record")
-        if missions.world_changed[0]:
-            raise RecordError("mission", "its world changed under way", "one in a world that stays as it is")
+        check_world_stays(missions, 0)
         starts, number, world = missions.options[0]
         return MissionRecord(
             scenario=missions.scenario,

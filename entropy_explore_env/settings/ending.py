@@ -50,9 +50,8 @@ class Ending:
         unseen_free_voxels: Number of unseen free voxels, of those that can be seen, at which the mission
             ends; None = by entropy, or by `seen_share`.
         return_to_start: With `seen_share` or `unseen_free_voxels`: the mission ends when so much is seen and
-            every robot that still works stands where it started, up to the width of its body. Frontier rules,
-            `planned-rate` in plans that are to be seen whole among them, drive home when they find no
-            frontier.
+            every robot that still works stands where it started, up to the width of its body. Frontier rules
+            and `planned-rate` drive home when they find no frontier.
         time_limit_s: Simulated time after which the mission is cut off (a truncation), 1e-3 to 1e9; inf =
             never.
         max_cycles: Steps after which the mission is cut off; None = never.

@@ -7,6 +7,7 @@ import pytest
 
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import CallOrderError, RecordError, SettingError
+from entropy_explore_env.missions.snapshot import snapshot
 from entropy_explore_env.reports.mission_record import CommandRecorder
 from entropy_explore_env.robots.motion import MoveEnd
 
@@ -88,7 +89,11 @@ def test_bad_blocks_are_refused_and_records_say_so():
         with pytest.raises(SettingError, match=message):
             env.set_world_block(low, high, **more)
     assert not env.missions.worlds[0].occupied.any()
-    recorder = CommandRecorder(env.missions)
-    env.set_world_block(*DOOR)
-    with pytest.raises(RecordError, match="its world changed under way"):
-        recorder.record()
+    for at_s in (None, 1.0):
+        env.reset(seed=0)
+        recorder = CommandRecorder(env.missions)
+        snapshot(env.missions)
+        env.set_world_block(*DOOR, at_s=at_s)
+        for refused in (recorder.record, lambda: snapshot(env.missions)):
+            with pytest.raises(RecordError, match="its world changes under way"):
+                refused()
