@@ -19,6 +19,7 @@ from entropy_explore_env.errors import RecordError, SettingError, WorldError, on
 from entropy_explore_env.interop.bag_writer import typestore
 from entropy_explore_env.interop.messages import grid_of_message, matrix_of, percent_of, pose_of_matrix
 from entropy_explore_env.interop.octree import voxels_of_tree
+from entropy_explore_env.robots.rotations import gaze_of
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.validation import checked_path
 from entropy_explore_env.worlds.world import World
@@ -29,6 +30,8 @@ _BASES = ("base_footprint", "base_link")
 """Frames of a robot in bags without Odometry."""
 _FLOATS = {7: "f4", 8: "f8"}
 _MOST_LINKS = 100
+_LEVEL = 1.0 - 1e-6
+"""Least cosine between the vertical axes of a map's frame and of the map frame."""
 
 
 class MapHeard(NamedTuple):
@@ -233,20 +236,40 @@ class BagReader:
         poses = {number: pose_of_matrix(each) for number, each in matrices.items() if each is not None}
         if not poses:
             return None
+        frame = frames.to(self._map_frame, message.header.frame_id)
         if kind == _GRID:
             grid = grid_of_message(message)
-            return MapHeard(time_s, grid.grid, grid.origin, grid.bottom_m, grid.resolution_m, poses)
+            corner = np.array([*grid.origin[:2], grid.bottom_m, grid.origin[2], 0.0])
+            origin, bottom_m = in_map_frame(corner, frame)
+            return MapHeard(time_s, grid.grid, origin, bottom_m, grid.resolution_m, poses)
         if kind == _TREE:
             labels, low = voxels_of_tree(np.asarray(message.data).tobytes(), bool(message.binary))
             edge_m = float(message.resolution)
-            x, y, z = (float(v) * edge_m for v in low)
-            return MapHeard(time_s, percent_of(labels), (x, y, 0.0), z, edge_m, poses)
-        sensor = frames.to(self._map_frame, message.header.frame_id)
-        if sensor is None:
+            corner = np.array([*(np.asarray(low, np.float64) * edge_m), 0.0, 0.0])
+            origin, bottom_m = in_map_frame(corner, frame)
+            return MapHeard(time_s, percent_of(labels), origin, bottom_m, edge_m, poses)
+        if frame is None:
             return None
-        points = points_of_cloud(message) @ sensor[:3, :3].T + sensor[:3, 3]
+        points = points_of_cloud(message) @ frame[:3, :3].T + frame[:3, 3]
         robot = next((n for n, name in enumerate(self.robots) if name in message.header.frame_id), 0)
-        return ScanHeard(time_s, robot, pose_of_matrix(sensor), points, poses)
+        return ScanHeard(time_s, robot, pose_of_matrix(frame), points, poses)
+
+
+def in_map_frame(corner: np.ndarray, frame: np.ndarray | None) -> tuple[tuple[float, float, float], float]:
+    """Return ((x, y, yaw), z) in the map frame of a grid's corner (x, y, z, yaw, pitch) in its own frame.
+
+    A frame of which no transform was heard, None, counts as the map frame.
+
+    Raises:
+        SettingError: The frame does not lie level.
+    """
+    if frame is None:
+        frame = np.eye(4)
+    yaw_rad = float(corner[3]) + gaze_of(frame[:3, :3])[0]
+    if frame[2, 2] < _LEVEL:
+        raise SettingError("frame of the map", frame[:3, :3].tolist(), "one that lies level in the map frame")
+    x, y, z = (float(v) for v in frame[:3, :3] @ corner[:3] + frame[:3, 3])
+    return (x, y, yaw_rad), z
 
 
 def world_of_bag(path: Path | str, topic: str | None = None) -> World:

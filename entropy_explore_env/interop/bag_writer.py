@@ -2,11 +2,13 @@
 
 Topics: `/map` (OccupancyGrid) in plans or `/octomap` (Octomap) in 3-D, of what the team knows; `/tf`; and for
 each robot `/robot_N/odom` (Odometry), `/robot_N/scan` (PointCloud2 of the hits, in the robot's frame),
-`/robot_N/path` (Path of each drive) and `/robot_N/goal` (Marker, an arrow).
+`/robot_N/path` (Path of each drive) and `/robot_N/goal` (Marker, an arrow). OctoMap puts voxels at multiples
+of their edge: `/octomap` is in the frame `octomap`, which lies where the voxels of the grid do.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import shutil
 from importlib.resources import files
@@ -81,6 +83,8 @@ class BagWriter:
         self._noted_s, self._map_due_s = -1.0, 0.0
         robots = missions.scenario.robots
         self._scans, self._departed_s = np.zeros(robots, np.int64), np.full(robots, -1.0)
+        edge_m, corner_m = missions.grid.voxel_size_m, np.asarray(missions.grid.origin_m)
+        self._octomap_m = corner_m - np.rint(corner_m / edge_m) * edge_m
 
     def __enter__(self) -> BagWriter:
         return self
@@ -154,23 +158,14 @@ class BagWriter:
         return self._make("geometry_msgs/msg/Pose", position=self._point(pose), orientation=turn)
 
     def _write_poses(self, time_s: float, poses: np.ndarray) -> None:
-        """Write where all robots are: tf and odometry."""
-        transforms = []
+        """Write where all robots are, tf and odometry, and where the octomap is."""
+        header, transforms = self._header(time_s, "map"), []
+        if not self._missions.grid.flat:
+            lattice = np.array([*self._octomap_m, 0.0, 0.0])
+            transforms.append(self._transform(header, "octomap", lattice))
         for robot, pose in enumerate(poses):
-            header, placed, frame = self._header(time_s, "map"), self._pose(pose), f"robot_{robot}"
-            transform = self._make(
-                "geometry_msgs/msg/Transform",
-                translation=self._vector(*pose[:3]),
-                rotation=placed.orientation,
-            )
-            transforms.append(
-                self._make(
-                    "geometry_msgs/msg/TransformStamped",
-                    header=header,
-                    child_frame_id=frame,
-                    transform=transform,
-                )
-            )
+            placed, frame = self._pose(pose), f"robot_{robot}"
+            transforms.append(self._transform(header, frame, pose))
             still, nothing = self._vector(0.0, 0.0, 0.0), np.zeros(36)
             twist = self._make("geometry_msgs/msg/Twist", linear=still, angular=still)
             self._write(
@@ -183,6 +178,13 @@ class BagWriter:
                 twist=self._make("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=nothing),
             )
         self._write("/tf", "tf2_msgs/msg/TFMessage", time_s, transforms=transforms)
+
+    def _transform(self, header: Any, frame: str, pose: np.ndarray) -> Any:  # noqa: ANN401
+        """Return the geometry_msgs/TransformStamped of a frame at a pose (5,)."""
+        turn, place = self._pose(pose).orientation, self._vector(*pose[:3])
+        transform = self._make("geometry_msgs/msg/Transform", translation=place, rotation=turn)
+        kind = "geometry_msgs/msg/TransformStamped"
+        return self._make(kind, header=header, child_frame_id=frame, transform=transform)
 
     def _write_drive(self, robot: int, own: np.void) -> None:
         """Write the path of a drive, and an arrow at the viewpoint to which it leads."""
@@ -261,12 +263,13 @@ class BagWriter:
         if belief.grid.flat:
             self._write_plan(belief, time_s)
         elif belief.known.any():
-            tree = octomap_of(belief, full=False)
+            corner_m = np.asarray(belief.grid.origin_m) - self._octomap_m
+            grid = dataclasses.replace(belief.grid, origin_m=tuple(corner_m.tolist()))
+            tree = octomap_of(dataclasses.replace(belief, grid=grid), full=False)
             data = np.frombuffer(tree[tree.index(b"\ndata\n") + 6 :], np.int8)
-            about = {"binary": True, "id": "OcTree", "resolution": belief.grid.voxel_size_m, "data": data}
-            self._write(
-                "/octomap", "octomap_msgs/msg/Octomap", time_s, header=self._header(time_s, "map"), **about
-            )
+            about = {"binary": True, "id": "OcTree", "resolution": grid.voxel_size_m, "data": data}
+            header = self._header(time_s, "octomap")
+            self._write("/octomap", "octomap_msgs/msg/Octomap", time_s, header=header, **about)
 
     def _write_plan(self, belief: Map, time_s: float) -> None:
         """Write an OccupancyGrid."""

@@ -17,7 +17,14 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import RecordError, SettingError, WorldError
 from entropy_explore_env.explorer.explorer import Explorer
 from entropy_explore_env.explorer.planned_rate import PlannedRate
-from entropy_explore_env.interop.bag_reader import BagReader, Frames, MapHeard, ScanHeard, world_of_bag
+from entropy_explore_env.interop.bag_reader import (
+    BagReader,
+    Frames,
+    MapHeard,
+    ScanHeard,
+    in_map_frame,
+    world_of_bag,
+)
 from entropy_explore_env.interop.bag_writer import BagWriter, typestore
 from entropy_explore_env.interop.map_files import octomap_of
 from entropy_explore_env.interop.messages import grid_of_message, pose_of, pose_of_matrix
@@ -38,8 +45,8 @@ TYPES = {
 }
 
 
-def written_mission(folder, name, time_limit_s):
-    settings = {"robots": 2, "time_limit_s": time_limit_s, "track_truth": True}
+def written_mission(folder, name, time_limit_s, **more):
+    settings = {"robots": 2, "time_limit_s": time_limit_s, "track_truth": True, **more}
     env = EntropyExploreEnv(with_settings(scripted(find_scenario(name)), settings))
     with BagWriter(env.missions, folder) as bag:
         run_mission(env, PlannedRate(), 0, lambda _: bag.note())
@@ -56,7 +63,8 @@ def office(tmp_path_factory):
 @pytest.fixture(scope="module")
 def box(tmp_path_factory):
     folder = tmp_path_factory.mktemp("bags") / "box"
-    return folder, written_mission(folder, "box-7x11x5", 20.0)
+    off_lattice = Grid((7, 11, 5), 0.5, (0.2, -0.1, 0.3))
+    return folder, written_mission(folder, "box-7x11x5", 20.0, grid=off_lattice)
 
 
 def messages(folder, topic):
@@ -124,7 +132,9 @@ def test_a_bag_is_a_world(office, box):
     for folder, env in (office, box):
         world, labels = world_of_bag(folder), env.joint_map().labels()
         known = np.argwhere(labels != UNKNOWN)
-        low = np.rint((np.array(world.grid.origin_m) - env.scenario.grid.origin_m) / world.grid.voxel_size_m)
+        edges = (np.array(world.grid.origin_m) - env.scenario.grid.origin_m) / world.grid.voxel_size_m
+        low = np.rint(edges)
+        assert np.allclose(edges, low)
         for at in known[:: max(len(known) // 200, 1)]:
             assert world.occupied[tuple(at - low.astype(int))] == (labels[tuple(at)] == SOLID)
     assert box[1].missions.grid.shape == (7, 11, 5)
@@ -182,6 +192,13 @@ def test_frames_are_chained():
     frames.hear("odom", "/base_link", still, store.types["geometry_msgs/msg/Quaternion"](x=0, y=0, z=0, w=1))
     assert np.allclose(pose_of_matrix(frames.to("map", "base_link")), at)
     assert frames.to("map", "laser") is None
+    with pytest.raises(SettingError, match=r"frame of the map = .*level"):
+        in_map_frame(np.zeros(5), frames.to("map", "odom"))
+    turned = np.array(
+        [[0.0, -1.0, 0.0, 3.0], [1.0, 0.0, 0.0, 4.0], [0.0, 0.0, 1.0, 5.0], [0.0, 0.0, 0.0, 1.0]]
+    )
+    origin, bottom_m = in_map_frame(np.array([1.0, 2.0, 0.5, 0.1, 0.0]), turned)
+    assert np.allclose(origin, (1.0, 5.0, np.pi / 2 + 0.1)) and bottom_m == 5.5
 
 
 def test_what_is_no_bag_with_maps_is_refused_by_name(office, tmp_path):
