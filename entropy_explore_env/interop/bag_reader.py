@@ -17,8 +17,13 @@ import numpy as np
 
 from entropy_explore_env.errors import RecordError, SettingError, WorldError, one_of
 from entropy_explore_env.interop.bag_writer import typestore
-from entropy_explore_env.interop.messages import grid_of_message, matrix_of, percent_of, pose_of_matrix
-from entropy_explore_env.interop.octree import voxels_of_tree
+from entropy_explore_env.interop.messages import (
+    grid_of_message,
+    matrix_of,
+    percent_of,
+    pose_of_matrix,
+    voxels_of_tree,
+)
 from entropy_explore_env.robots.rotations import gaze_of
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.validation import checked_path

@@ -12,10 +12,13 @@ import numpy as np
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.robots.rotations import gaze_of, quaternion_matrix
-from entropy_explore_env.worlds.files.voxels import FREE, SOLID
+from entropy_explore_env.worlds.files.octomap_tree import leaves_of, own_labels
+from entropy_explore_env.worlds.files.voxels import FREE, SOLID, RefusedError
 
 ARROW_M = (0.6, 0.12, 0.12)
 """Length, width and height of the arrow at a robot's goal."""
+_MOST_VOXELS = 1 << 27
+"""A tree may say that a few bytes fill the world."""
 _LEVEL = 1e-3
 """Largest x and y of the quaternion of a map that lies level."""
 
@@ -53,6 +56,23 @@ def grid_of_message(message: Any) -> GridMessage:  # noqa: ANN401 - any class wi
     grid = np.ascontiguousarray(rows.astype(np.int8, copy=False).reshape(height, width).T)
     yaw = 2.0 * math.atan2(float(turn[2]), float(turn[3]))
     return GridMessage(grid, (corner[0], corner[1], yaw), resolution_m, corner[2])
+
+
+def voxels_of_tree(data: bytes, binary: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Return the labels (X, Y, Z) int8 of an Octomap's box, and its lower corner (3,) in voxels.
+
+    Raises:
+        SettingError: The bytes end too early, the tree is too deep, or its box has too many voxels.
+    """
+    try:
+        leaves, _ = leaves_of(data, binary)
+    except RefusedError as error:
+        raise SettingError("octomap.data", f"{len(data)} bytes", str(error)) from None
+    low, high = leaves.box
+    x, y, z = (high - low).tolist()
+    if x * y * z > _MOST_VOXELS:
+        raise SettingError("octomap.data", [x, y, z], f"a box of at most {_MOST_VOXELS} voxels")
+    return own_labels(leaves._replace(corner=leaves.corner - low), (x, y, z)), low
 
 
 def percent_of(labels: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from entropy_explore_env.settings.validation import is_number
 from entropy_explore_env.worlds.files.map_server import RULES
 from entropy_explore_env.worlds.files.process import Format
 
-OCTOMAP = Format("octomap_tree", "OctoMap tree", memory_per_byte=512)  # octomap's own nodes take 230
+OCTOMAP = Format("octomap_tree", "OctoMap tree", memory_per_byte=512)
 _MAP_SERVER = Format("map_server", "YAML of map_server with its image")
 IMAGE = Format("images", "PNG, PGM, JPEG, BMP or GIF image")
 _GEOTIFF = Format("geotiff", "GeoTIFF height map")

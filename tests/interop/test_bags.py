@@ -27,8 +27,7 @@ from entropy_explore_env.interop.bag_reader import (
 )
 from entropy_explore_env.interop.bag_writer import BagWriter, typestore
 from entropy_explore_env.interop.map_files import octomap_of
-from entropy_explore_env.interop.messages import grid_of_message, pose_of, pose_of_matrix
-from entropy_explore_env.interop.octree import voxels_of_tree
+from entropy_explore_env.interop.messages import grid_of_message, pose_of, pose_of_matrix, voxels_of_tree
 from entropy_explore_env.robots.rotations import quaternion_of
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid

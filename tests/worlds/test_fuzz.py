@@ -75,7 +75,7 @@ def test_drawn_octrees_are_read_and_refused(folder):
                 except WorldError as error:
                     causes[error.allowed.split(";")[0]] += 1
     assert loaded > 20
-    assert causes["an OctoMap tree of at most 16 levels below its root"] > 2
+    assert causes["a whole OctoMap tree of at most 16 levels below its root"] > 2
     assert causes["an OctoMap tree of as many nodes as its head says"] > 5
 
 

@@ -1,18 +1,20 @@
-"""OctoMap trees (Hornung et al. 2013), `.bt` and `.ot`, read with octomap-python.
+"""OctoMap trees (Hornung et al. 2013): files `.bt` and `.ot`, and the nodes in messages of ROS.
 
-A node is solid from the tree's own occupancy threshold on; space that no leaf covers is unknown. Of trees
-with colours or times (ColorOcTree, OcTreeStamped) only the occupancy is read. The leaves are summed up in
-voxels of the wanted size, a slab of the map after the other: memory follows the result, and the grid of the
-tree's own resolution is never made.
+A node is solid from log-odds of 0 on; space that no leaf covers is unknown. Of trees with colours or times
+(ColorOcTree, OcTreeStamped) only the occupancy is read. The leaves are summed up in voxels of the wanted
+size, a slab of the map after the other: memory follows the result, and the grid of the tree's own resolution
+is never made. octomap-python is not used: where a file ends too early, it makes nodes of what it finds in
+memory.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 import re
+import struct
+from array import array
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,7 +32,7 @@ from entropy_explore_env.worlds.files.voxels import (
     content,
 )
 
-NEEDS = (("octomap", "octomap-python"),)
+NEEDS = ()
 _RECORDS = {b"OcTree": 5, b"1": 5, b"OcTreeStamped": 5, b"ColorOcTree": 8}
 """Id of a tree, "1" in old files → bytes of a node in an .ot: its occupancy, a colour, its children."""
 _DATA_LINE = re.compile(rb"\r?\ndata[ \t]*\r?\n")
@@ -38,6 +40,9 @@ _BINARY_FILE, _FULL_FILE = b"# Octomap OcTree binary file", b"# Octomap OcTree f
 _SIZED = "an OctoMap with a resolution > 0 and finite bounds"
 _DEPTH = 16
 """Levels below the root."""
+_WHOLE = f"a whole OctoMap tree of at most {_DEPTH} levels below its root"
+_INNER = 3
+"""State of a child that has children of its own; 1 is free, 2 solid, 0 unknown."""
 _VOXELS_PER_BYTE = 4096
 """Limit of the voxels for each byte of the file: a leaf, at least two bits, may cover many."""
 _LEAVES_AT_ONCE = 1 << 16
@@ -46,7 +51,7 @@ _SLAB_VOXELS = 1 << 21
 
 
 class Leaves(NamedTuple):
-    """The N leaves of a tree: cubes, in voxels of its own resolution from its lower corner."""
+    """The N leaves of a tree: cubes, in voxels of its own resolution."""
 
     corner: np.ndarray
     """(N, 3) whole numbers, lower corner."""
@@ -55,61 +60,42 @@ class Leaves(NamedTuple):
     solid: np.ndarray
     """(N,) bool; the others are free."""
 
+    @property
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
+        """The lower and the upper corner (3,) of the box around all leaves."""
+        return self.corner.min(axis=0), (self.corner + self.width[:, None]).max(axis=0)
+
 
 def read(path: Path, options: Options) -> Voxels:
     """Return the tree's voxels at the wanted size, or at its own resolution."""
     data = content(path)
-    tree = _tree(data)
-    edge = float(tree.getResolution())
-    low, high = np.array(tree.getMetricMin()), np.array(tree.getMetricMax())
-    if not (edge > 0 and np.isfinite(low).all() and np.isfinite(high).all()):
-        raise RefusedError(_SIZED)
-    extent = np.rint((high - low) / edge)
-    if (extent < 1).any():
+    binary = data.startswith(_BINARY_FILE)
+    size, edge, body = _head_and_body(data, binary)
+    leaves, nodes = leaves_of(body, binary)
+    if nodes != size:
+        raise RefusedError(f"an OctoMap tree of as many nodes as its head says; there are {nodes}")
+    first, last = leaves.box
+    edges = leaves.width[:, None] * edge
+    low = ((leaves.corner / leaves.width[:, None] + 0.5) * edges - edges / 2.0).min(axis=0)
+    if not np.isfinite([low, low + (last - first) * edge]).all():
         raise RefusedError(_SIZED)
     voxel_m = options.get("voxel_size_m")
     wanted_m = edge if voxel_m is None else float(voxel_m)
     own = abs(wanted_m - edge) < 1e-9 * edge
     scale = 1.0 if own else wanted_m / edge
-    shape = checked_shape(extent / scale)
+    shape = checked_shape((last - first) / scale)
     if np.prod(shape) > 1_000_000 + _VOXELS_PER_BYTE * len(data):
         raise RefusedError(f"an OctoMap whose box holds at most {_VOXELS_PER_BYTE} voxels a byte")
-    leaves = _leaves(tree, low, edge, extent)
-    del tree
+    leaves = leaves._replace(corner=leaves.corner - first)
     labels = own_labels(leaves, shape) if own else _summed_labels(leaves, scale, shape)
     return Voxels(labels, edge if own else wanted_m, (float(low[0]), float(low[1]), float(low[2])))
-
-
-def _tree(data: bytes) -> Any:  # noqa: ANN401 - octomap has no types
-    """Return the tree in the bytes, whose nodes are counted before octomap reads them.
-
-    Where a file ends too early, octomap makes nodes of what it finds in its memory, at any depth, until there
-    is no more of it. So it is given the nodes that are there, under a head of our own.
-    """
-    import octomap
-
-    binary = data.startswith(_BINARY_FILE)
-    if not binary and not data.startswith(_FULL_FILE):
-        raise RefusedError("a whole OctoMap tree")
-    size, edge, body = _head_and_body(data, binary)
-    nodes, used = _counted_nodes(body, binary)
-    if nodes != size:
-        raise RefusedError(f"an OctoMap tree of as many nodes as its head says; there are {nodes}")
-    first = _BINARY_FILE if binary else _FULL_FILE
-    whole = b"%s\nid OcTree\nsize %d\nres %s\ndata\n%s" % (first, size, repr(edge).encode(), body[:used])
-    if not binary:
-        return octomap.OcTree.read(whole)
-    tree = octomap.OcTree(1.0)
-    if not tree.readBinary(whole):
-        raise RefusedError("a whole OctoMap tree")
-    return tree
 
 
 def _head_and_body(data: bytes, binary: bool) -> tuple[int, float, bytes]:
     """Return the number of nodes and the resolution that a file states, and its nodes without colours."""
     found = _DATA_LINE.search(data)
-    if found is None:
-        raise RefusedError("a whole OctoMap tree")
+    if found is None or not (binary or data.startswith(_FULL_FILE)):
+        raise RefusedError(_WHOLE)
     head, body = data[: found.start()], data[found.end() :]
     rows = (line.split() for line in head.splitlines() if not line.startswith(b"#"))
     about = {row[0]: row[1] for row in rows if len(row) > 1}
@@ -128,62 +114,51 @@ def _head_and_body(data: bytes, binary: bool) -> tuple[int, float, bytes]:
     return size, edge, body
 
 
-def _counted_nodes(body: bytes, binary: bool) -> tuple[int, int]:
-    """How many nodes a tree has, and how many bytes hold them.
+def leaves_of(body: bytes, binary: bool) -> tuple[Leaves, int]:
+    """Return the leaves of a tree, in voxels from its middle, and the number of its nodes.
 
-    Nodes follow each other depth first. A binary file has two bytes for every inner node, two bits of them
-    for each child: none, free, solid or inner. The other kind has a float and a byte for every node, a bit of
-    it for each child. A tree ends where no child is left to come.
+    Nodes follow each other depth first, and child i lies at the upper half of x, y and z by the bits 1, 2 and
+    4 of i. In the binary form every inner node is two bytes, two bits for the state of each child. In the
+    full form every node is a float32, its log-odds, and a byte, a bit of it for each child. An inner node
+    without children counts as free. What follows the tree is left alone.
+
+    Raises:
+        RefusedError: The bytes end too early, or the tree is too deep.
     """
-    if binary:
-        words = np.frombuffer(body, "<u2", len(body) // 2)
-        pairs = (words[:, None] >> np.arange(0, 16, 2)) & 3
-        stored_children, children = (pairs == 3).sum(axis=1), (pairs > 0).sum(axis=1)
-        record = 2
-    else:
-        masks = np.frombuffer(body, np.uint8, len(body) // 5 * 5)[4::5]
-        stored_children = children = np.unpackbits(masks[:, None], axis=1).sum(axis=1)
-        record = 5
-    to_come = 1 + np.cumsum(stored_children.astype(np.int64) - 1)
-    ends = np.flatnonzero(to_come == 0)
-    if len(ends) == 0:
-        raise RefusedError("a whole OctoMap tree")
-    count = int(ends[0]) + 1
-    if _levels(stored_children[:count].tolist()) > (_DEPTH if binary else _DEPTH + 1):
-        raise RefusedError(f"an OctoMap tree of at most {_DEPTH} levels below its root")
-    return 1 + int(children[:count].sum()), count * record
+    table, nodes, at, record = array("i"), 1, 0, 2 if binary else 5
+    half = 1 << (_DEPTH - 1)
+    waiting = [(-half, -half, -half, 2 * half)]
+    while waiting:
+        x, y, z, width = waiting.pop()
+        if at + record > len(body):
+            raise RefusedError(_WHOLE)
+        if binary:
+            states, solid = body[at] | body[at + 1] << 8, False
+        else:
+            log_odds, mask = struct.unpack_from("<fB", body, at)
+            states, solid = _STATES_OF_MASK[mask], log_odds >= 0.0
+        at, half = at + record, width // 2
+        if half == 0 and (binary or states):
+            raise RefusedError(_WHOLE)
+        if states == 0:
+            table.extend((x, y, z, width, solid))
+        for child in range(7, -1, -1):  # the first one is popped first
+            state = states >> 2 * child & 3
+            if state:
+                nodes += 1
+                cube = (x + half * (child & 1), y + half * (child >> 1 & 1), z + half * (child >> 2), half)
+                if state == _INNER:
+                    waiting.append(cube)
+                else:
+                    table.extend((*cube, state == 2))
+    rows = np.frombuffer(table, np.intc).reshape(-1, 5)
+    return Leaves(rows[:, :3], rows[:, 3], rows[:, 4] > 0), nodes
 
 
-def _levels(children: list[int]) -> int:
-    """How many levels nodes have that follow each other depth first, from each one's number of children."""
-    to_come, most = [1], 1
-    for count in children:
-        to_come[-1] -= 1
-        if count:
-            to_come.append(count)
-            most = max(most, len(to_come))
-        while to_come and to_come[-1] == 0:
-            to_come.pop()
-    return most
-
-
-def _leaves(tree: Any, low: np.ndarray, edge: float, extent: np.ndarray) -> Leaves:  # noqa: ANN401
-    """All leaves, every one a cube of 2^(16 - depth) voxels, in a compact form: 17 bytes each."""
-    rows = (
-        (leaf.getX(), leaf.getY(), leaf.getZ(), leaf.getDepth(), tree.isNodeOccupied(leaf))
-        for leaf in tree.begin_leafs()
-    )
-    parts = []
-    while some := list(itertools.islice(rows, _LEAVES_AT_ONCE)):
-        table = np.array(some, np.float64)
-        width = np.left_shift(1, _DEPTH - table[:, 3].astype(np.int64))
-        corner = np.rint((table[:, :3] - low) / edge - 0.5 * width[:, None])
-        if not ((corner >= 0).all() and (corner + width[:, None] <= extent).all()):
-            raise RefusedError("an OctoMap whose leaves lie inside its bounds")
-        parts.append(Leaves(corner.astype(np.int32), width.astype(np.int32), table[:, 4] > 0.5))
-    if not parts:
-        raise RefusedError("a whole OctoMap tree")
-    return Leaves(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+_STATES_OF_MASK = [
+    sum(_INNER << 2 * child for child in range(8) if mask >> child & 1) for mask in range(1 << 8)
+]
+"""Which children a node of the full form has → their states."""
 
 
 def own_labels(leaves: Leaves, shape: tuple[int, int, int]) -> np.ndarray:
