@@ -38,7 +38,7 @@ from entropy_explore_env.worlds.formats import (
     format_of,
 )
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
-from entropy_explore_env.worlds.recipes.empty import empty
+from entropy_explore_env.worlds.recipes.rooms import empty
 from entropy_explore_env.worlds.splits import draw_world_number, world_generator
 from entropy_explore_env.worlds.world import World
 from entropy_explore_env.writing import write_atomically

@@ -1,4 +1,10 @@
-"""The recipes by name."""
+"""The recipes by name.
+
+A recipe takes the workspace and a generator, and draws all that varies of a world from that. It raises a
+WorldError where the grid is flat, too small or too coarse for it. Where its docstring does not say otherwise,
+all free space is connected in which a body of 0.3 m radius fits, and in 3-D everything is as high as the
+workspace.
+"""
 
 from __future__ import annotations
 
@@ -9,18 +15,14 @@ from types import MappingProxyType
 import numpy as np
 
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.worlds.recipes.bhattacharya_cluttered import bhattacharya_cluttered
-from entropy_explore_env.worlds.recipes.bhattacharya_office import bhattacharya_office
+from entropy_explore_env.worlds.recipes.bhattacharya import bhattacharya_cluttered, bhattacharya_office
 from entropy_explore_env.worlds.recipes.cave import cave
 from entropy_explore_env.worlds.recipes.cliff import cliff
-from entropy_explore_env.worlds.recipes.cluttered import cluttered
 from entropy_explore_env.worlds.recipes.corridor import corridor
-from entropy_explore_env.worlds.recipes.empty import empty
-from entropy_explore_env.worlds.recipes.furnished import furnished
 from entropy_explore_env.worlds.recipes.hybrid import hybrid
-from entropy_explore_env.worlds.recipes.lab import lab
-from entropy_explore_env.worlds.recipes.occlusions import occlusions
+from entropy_explore_env.worlds.recipes.obstacles import cluttered, occlusions
 from entropy_explore_env.worlds.recipes.office import office
+from entropy_explore_env.worlds.recipes.rooms import empty, furnished, lab
 from entropy_explore_env.worlds.recipes.terrain import rough_terrain, smooth_terrain, terrain
 from entropy_explore_env.worlds.world import World
 

@@ -29,17 +29,7 @@ _LOOPS = 0.15
 
 
 def cave(grid: Grid, rng: np.random.Generator) -> World:
-    """Halls and tunnels in rock, at all heights in 3-D; a plan of them in 2-D.
-
-    All free space in which a body of 0.3 m radius fits is connected.
-
-    Args:
-        grid: The workspace, at least 12 × 10 m, in 3-D 3 m high.
-        rng: Draws halls, tunnels and roughness.
-
-    Raises:
-        WorldError: The grid is too small.
-    """
+    """Halls and tunnels in rock, at all heights in 3-D; a plan of them in 2-D."""
     require_size(grid, "a cave", 12.0, 10.0)
     narrowest = BODY_RADIUS_M + 1.8 * grid.voxel_size_m + 0.2
     axes = 2 if grid.flat else 3

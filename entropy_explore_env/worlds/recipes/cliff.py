@@ -39,15 +39,7 @@ _PILED, _PILE_M, _PILES_PER_M2 = 0.5, 0.4, 0.04
 
 
 def cliff(grid: Grid, rng: np.random.Generator) -> World:
-    """Return a plateau for x below the edge, rough ground beyond; all free space is connected.
-
-    Args:
-        grid: The workspace, in 3-D, at least 8 × 6 m and 4.5 m high, in voxels of 0.5 m at most.
-        rng: Draws edge, ground, rocks and which end is unreadable.
-
-    Raises:
-        WorldError: The grid is flat, too small or too coarse.
-    """
+    """Return a plateau for x below the edge, rough ground beyond; all free space is connected."""
     require_size(grid, "a cliff", 8.0, 6.0)
     if grid.voxel_size_m > _LARGEST_VOXEL_M:
         raise WorldError("Grid.voxel_size_m", grid.voxel_size_m, f"at most {_LARGEST_VOXEL_M:g} for a cliff")

@@ -27,15 +27,7 @@ _LOOPS = 0.25
 
 
 def corridor(grid: Grid, rng: np.random.Generator) -> World:
-    """Return a net of corridors; all of it is connected for a body of 0.3 m radius.
-
-    Args:
-        grid: The workspace, at least 8 × 4 m; in 3-D, corridors are as high as the workspace.
-        rng: Draws places, widths and connections.
-
-    Raises:
-        WorldError: The grid is too small.
-    """
+    """Return a net of corridors; all of it is connected for a body of 0.3 m radius."""
     require_size(grid, "corridors", 8.0, 4.0)
     plan = corridor_plan((grid.shape[0], grid.shape[1]), grid.voxel_size_m, rng)
     return World(grid, extruded(grid, plan.solid), "corridor")

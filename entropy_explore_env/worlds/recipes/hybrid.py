@@ -9,9 +9,9 @@ import numpy as np
 
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.components import largest_component
-from entropy_explore_env.worlds.recipes.cluttered import cluttered_plan
 from entropy_explore_env.worlds.recipes.connectivity import body_room, cut_gates, fill_pockets
 from entropy_explore_env.worlds.recipes.corridor import corridor_plan
+from entropy_explore_env.worlds.recipes.obstacles import cluttered_plan
 from entropy_explore_env.worlds.recipes.office import office_plan
 from entropy_explore_env.worlds.recipes.plan import Rectangle, bare_plan, extruded, require_size
 from entropy_explore_env.worlds.world import World
@@ -22,17 +22,7 @@ _GATES = 2
 
 
 def hybrid(grid: Grid, rng: np.random.Generator) -> World:
-    """Three kinds of world side by side, two gates of 1.2 m between each two of them.
-
-    All free space in which a body of 0.3 m radius fits is connected.
-
-    Args:
-        grid: The workspace, at least 20 × 16 m; in 3-D, everything is as high as the workspace.
-        rng: Draws which part is which, each part, and the gates.
-
-    Raises:
-        WorldError: The grid is too small.
-    """
+    """Three kinds of world side by side, two gates of 1.2 m between each two of them."""
     require_size(grid, "a hybrid of three worlds", 20.0, 16.0)
     plan = bare_plan(grid.shape, grid.voxel_size_m)
     plan.solid[:] = True

@@ -34,15 +34,8 @@ _AREA_A_PIECE_M2 = 5.0
 def office(grid: Grid, rng: np.random.Generator) -> World:
     """Rooms along corridors; cross corridors join the corridors where there are several.
 
-    All free space in which a body of 0.3 m radius fits is connected. 2-D offices are bare; in 3-D ones
+    2-D offices are bare; in 3-D ones
     desks, cupboards, shelves and tables stand in the rooms.
-
-    Args:
-        grid: The workspace, at least 8 × 6 m.
-        rng: Draws corridors, walls, doors and furniture.
-
-    Raises:
-        WorldError: The grid is too small.
     """
     require_size(grid, "an office", *_LEAST_M)
     plan = office_plan((grid.shape[0], grid.shape[1]), grid.voxel_size_m, rng)

@@ -40,17 +40,6 @@ def terrain(grid: Grid, rng: np.random.Generator) -> World:
 
     The space between ground and ceiling in which a body of 0.3 m radius fits is connected, and so is
     all free space.
-
-    Args:
-        grid: The workspace, in 3-D, at least 6 × 6 m, and high enough for 4 m of air, two
-            layers of ground and a relief of one.
-        rng: Draws the ground.
-
-    Returns:
-        A world with a ceiling above the ground of every column.
-
-    Raises:
-        WorldError: The grid is flat or too small.
     """
     return _ground(grid, rng, _HURST, "terrain")
 

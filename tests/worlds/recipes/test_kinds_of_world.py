@@ -17,14 +17,12 @@ from entropy_explore_env.settings.scenarios import (
     LAB,
     OCCLUSIONS,
 )
-from entropy_explore_env.worlds.recipes.bhattacharya_cluttered import bhattacharya_cluttered
-from entropy_explore_env.worlds.recipes.bhattacharya_office import bhattacharya_office
+from entropy_explore_env.worlds.recipes.bhattacharya import bhattacharya_cluttered, bhattacharya_office
 from entropy_explore_env.worlds.recipes.cave import cave
-from entropy_explore_env.worlds.recipes.cluttered import cluttered
 from entropy_explore_env.worlds.recipes.corridor import corridor
 from entropy_explore_env.worlds.recipes.hybrid import hybrid
-from entropy_explore_env.worlds.recipes.lab import lab
-from entropy_explore_env.worlds.recipes.occlusions import occlusions
+from entropy_explore_env.worlds.recipes.obstacles import cluttered, occlusions
+from entropy_explore_env.worlds.recipes.rooms import lab
 
 
 def distances(free):

@@ -1,4 +1,10 @@
-"""Convex obstacles scattered over a floor plan, far enough apart for a body to pass between them."""
+"""Convex obstacles, far enough apart for a body to pass between them, and the worlds that are made of them.
+
+Sawhney's cluttered, unstructured worlds: the paper gives no plans; here polygons of 0.6-3 m cover about 15 %
+of a hall's floor. Sujan's planar world (fig. 17) is 100 × 100 m of open ground with black occlusions; the
+paper says that robots start in the middle, and gives neither sizes nor number. Here polygons of 3-16 m cover
+about 12 % of the ground, none within 3 m of the middle.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +12,19 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.worlds.recipes.plan import BODY_RADIUS_M
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.worlds.recipes.connectivity import fill_pockets
+from entropy_explore_env.worlds.recipes.plan import BODY_RADIUS_M, extruded, require_size
+from entropy_explore_env.worlds.world import World
 
 _MAX_FAILURES = 60
 """After this many failures in a row the plan counts as full."""
+_CLUTTER_M = (0.3, 1.5)
+_CLUTTERED = 0.15
+_HEIGHTS_M = (0.5, 3.0)
+_OCCLUSIONS_M = (1.5, 8.0)
+_OCCLUDED = 0.12
+_OPEN_MIDDLE_M = 3.0
 
 
 def clearance_voxels(voxel_size_m: float) -> float:
@@ -84,3 +99,38 @@ def _polygon(longest: float, rng: np.random.Generator) -> tuple[np.ndarray, np.n
     normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     return normals, (normals * points).sum(axis=1)
+
+
+def cluttered(grid: Grid, rng: np.random.Generator) -> World:
+    """Obstacles scattered over a floor; in 3-D each has a height of its own."""
+    require_size(grid, "clutter", 6.0, 5.0)
+    solid, numbers = cluttered_plan((grid.shape[0], grid.shape[1]), grid.voxel_size_m, rng)
+    if grid.flat:
+        return World(grid, solid[:, :, None], "cluttered")
+    heights = rng.uniform(*_HEIGHTS_M, numbers.max() + 1)[numbers]
+    heights = np.where(numbers > 0, heights, np.where(solid, np.inf, 0.0))
+    occupied = (np.arange(grid.shape[2]) + 0.5) * grid.voxel_size_m < heights[:, :, None]
+    return World(grid, fill_pockets(occupied, grid.voxel_size_m), "cluttered")
+
+
+def cluttered_plan(
+    shape: tuple[int, int], voxel_size_m: float, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Solid voxels (X, Y) bool, and the number of the obstacle in each voxel, (X, Y) int32."""
+    solid = np.zeros(shape, bool)
+    numbers = scatter(solid, np.zeros(shape, bool), _CLUTTER_M, _CLUTTERED, voxel_size_m, rng)
+    return fill_pockets(solid, voxel_size_m), numbers
+
+
+def occlusions(grid: Grid, rng: np.random.Generator) -> World:
+    """Convex occlusions on a plane; they are as high as the workspace where it is 3-D.
+
+    Robots start anywhere in it; the
+    paper's start, the middle, is always free.
+    """
+    require_size(grid, "occlusions of up to 16 m", 40.0, 40.0)
+    offsets = [np.arange(n) + 0.5 - 0.5 * n for n in grid.shape[:2]]
+    middle = np.hypot(offsets[0][:, None], offsets[1]) * grid.voxel_size_m <= _OPEN_MIDDLE_M
+    solid = np.zeros(grid.shape[:2], bool)
+    scatter(solid, middle, _OCCLUSIONS_M, _OCCLUDED, grid.voxel_size_m, rng)
+    return World(grid, extruded(grid, fill_pockets(solid, grid.voxel_size_m)), "occlusions")

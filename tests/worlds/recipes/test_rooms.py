@@ -9,8 +9,7 @@ from scipy import ndimage
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import BOX, ROOM
-from entropy_explore_env.worlds.recipes.empty import empty
-from entropy_explore_env.worlds.recipes.furnished import furnished
+from entropy_explore_env.worlds.recipes.rooms import empty, furnished
 
 GRIDS = [ROOM.grid, BOX.grid, Grid((31, 17, 6), 0.25), Grid((40, 25, 1), 0.1)]
 

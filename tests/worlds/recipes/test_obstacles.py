@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from entropy_explore_env.worlds.recipes.convex import clearance_voxels, scatter
+from entropy_explore_env.worlds.recipes.obstacles import clearance_voxels, scatter
 
 SHAPE = (170, 130)
 

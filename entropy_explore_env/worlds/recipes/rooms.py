@@ -1,4 +1,8 @@
-"""A room with boxes on its floor, 0.5-2 m wide."""
+"""Single rooms: empty (Rocha04's), with boxes on the floor, and RochaMI's laboratory.
+
+RochaMI gives area and resolution of its laboratory, 23 m² at ε = 0.1 m, not the plan; here it is a room of
+5.0 × 4.6 × 2.0 m (scenario `lab`) with benches and cupboards along its walls and boxes between them.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +13,21 @@ import numpy as np
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.components import connected_components
+from entropy_explore_env.worlds.recipes.connectivity import fill_pockets
+from entropy_explore_env.worlds.recipes.furniture import LABORATORY, furnish
+from entropy_explore_env.worlds.recipes.plan import bare_plan, extruded, require_size
 from entropy_explore_env.worlds.world import World
 
 _ATTEMPTS = 100
 _FURNITURE_SHARE = 0.08
 """Approximate share of the floor that furniture covers."""
+_AREA_A_PIECE_M2 = 3.0
+
+
+def empty(grid: Grid, rng: np.random.Generator) -> World:
+    """Return a workspace with nothing in it but its walls; nothing is drawn."""
+    del rng
+    return World(grid, np.zeros(grid.shape, bool), "empty")
 
 
 def furnished(grid: Grid, rng: np.random.Generator) -> World:
@@ -21,13 +35,6 @@ def furnished(grid: Grid, rng: np.random.Generator) -> World:
 
     Its free space is connected, also for bodies with a radius of up to half a voxel; larger ones may not
     reach all of it, and start in the largest component.
-
-    Args:
-        grid: The workspace.
-        rng: Draws number, size and position of the boxes.
-
-    Raises:
-        WorldError: The grid is too small for a box and a passage around it.
     """
     for _ in range(_ATTEMPTS):
         occupied = _boxes(grid, rng)
@@ -53,3 +60,15 @@ def _boxes(grid: Grid, rng: np.random.Generator) -> np.ndarray:
         ]
         occupied[corner[0] : corner[0] + edges[0], corner[1] : corner[1] + edges[1], : edges[2]] = True
     return occupied
+
+
+def lab(grid: Grid, rng: np.random.Generator) -> World:
+    """Return a room with benches, cupboards and boxes.
+
+    All free space in which a body of 0.3 m radius fits is connected, in space and in every layer.
+    """
+    require_size(grid, "a laboratory", 4.0, 3.0)
+    plan = bare_plan(grid.shape, grid.voxel_size_m)
+    occupied = extruded(grid, plan.solid)
+    furnish(occupied, plan, plan.whole, LABORATORY, _AREA_A_PIECE_M2, rng)
+    return World(grid, fill_pockets(occupied, grid.voxel_size_m), "lab")
