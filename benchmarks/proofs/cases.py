@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from baselines.experiments.worker_pool import Failure, run_each
+from entropy_explore_env.missions.simulation import Missions
 
 
 class BrokenPromiseError(AssertionError):
@@ -46,3 +49,23 @@ def _said(failure: Failure) -> str:
     frames = re.findall(r'File "([^"]+)", line (\d+)', failure.trace)
     place = f" ({Path(frames[-1][0]).name}:{frames[-1][1]})" if frames else ""
     return failure.reason[:2000] + place
+
+
+def check_step(missions: Missions, rewards: Iterable[Any]) -> None:
+    """Check what missions have observed and been given in a step.
+
+    Args:
+        missions: After the step.
+        rewards: Numbers or arrays.
+
+    Raises:
+        BrokenPromiseError: An observation is outside its space, or a reward is not finite.
+    """
+    layout, seen = missions.layout, missions.observations
+    within = (seen >= layout.low.astype(np.float32)) & (seen <= layout.high.astype(np.float32))
+    for place in np.argwhere(~within)[:1]:
+        where = f"{seen[tuple(place)]!r} at {place.tolist()} of {list(layout.parts)}"
+        raise BrokenPromiseError(f"an observation is {where}, outside its space: {missions.scenario}")
+    for each in rewards:
+        if not np.isfinite(each).all():
+            raise BrokenPromiseError(f"a reward is not finite: {each}: {missions.scenario}")

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.proofs.cases import BrokenPromiseError, Found
+from benchmarks.proofs.cases import BrokenPromiseError, Found, check_step
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.missions.state_ranges import check_ranges
 from entropy_explore_env.settings.scenario import Scenario
@@ -137,15 +137,9 @@ def check(
     Raises:
         BrokenPromiseError: A promise is broken.
     """
-    name, layout = env.scenario.name, env.missions.layout
+    name = env.scenario.name
     _, rewards, terminated, truncated, infos = stepped
-    seen = env.missions.observations
-    within = (seen >= layout.low.astype(np.float32)) & (seen <= layout.high.astype(np.float32))
-    if not within.all():
-        raise BrokenPromiseError(f"{name}: {(~within).sum()} numbers of observations are outside their space")
-    for figures in (rewards, infos["reward_robots"]):
-        if not np.isfinite(figures).all():
-            raise BrokenPromiseError(f"{name}: rewards are {figures[~np.isfinite(figures)][:9]}")
+    check_step(env.missions, (rewards, infos["reward_robots"]))
     (missions_before, robots_before), (missions, robots) = before, now
     over, begun = missions["end"] != 0, missions_before["end"] != 0
     if not np.array_equal(terminated | truncated, over) or (terminated & truncated).any():

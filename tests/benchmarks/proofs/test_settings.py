@@ -2,76 +2,50 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
+from functools import reduce
+from types import NoneType, UnionType
+from typing import Literal, Union, get_args, get_origin
 
 import numpy as np
 import pytest
 
 from benchmarks.proofs.cases import BrokenPromiseError, Found, play_cases
-from benchmarks.proofs.drawn_scenarios import FIELDS, Numbers, draw_scenario
+from benchmarks.proofs.drawn_scenarios import draw_scenario, leaves
 from benchmarks.proofs.settings import WATCHDOG_S, check, play
 from entropy_explore_env import EntropyExploreEnv
-from entropy_explore_env.errors import EntropyExploreError
-from entropy_explore_env.settings.channel import Channel
-from entropy_explore_env.settings.faults import Outage, RadioFault, SensorFault
-from entropy_explore_env.settings.fiducials import Fiducials
+from entropy_explore_env.errors import RecordError
 from entropy_explore_env.settings.json import settings_of
-from entropy_explore_env.settings.observation import Observation
-from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import BOX
-from entropy_explore_env.settings.sensor import RangeSensor
-
-DRAWN_OTHERWISE = {
-    RangeSensor: {"field_of_view_rad", "angular_step_rad"},
-    Robot: {"localization", "above_ground_m"},
-    Fiducials: {"positions_m"},
-    Observation: {"patch_shape", "overview_shape"},
-    Scenario: {"name", "grid", "world", "robot", "sensor", "extra_kinds"}
-    | {"channel", "faults", "fiducials", "ending", "reward", "action", "observation"},
-    Channel: {"signal"},
-    Outage: {"robots"},
-    SensorFault: {"robots"},
-    RadioFault: {"robots"},
-}
+from entropy_explore_env.settings.validation import annotations_of
 
 
 def scenarios(count, few_kernels=False):
-    """The first scenarios that are allowed."""
-    found, number = [], 0
-    while len(found) < count:
-        number += 1
-        try:
-            found.append(draw_scenario(np.random.default_rng(number), few_kernels))
-        except EntropyExploreError:
-            continue
-    return found
-
-
-def parts_of(settings):
-    """A dataclass of settings, and all those in it."""
-    within = [part for part in vars(settings).values() if dataclasses.is_dataclass(part)]
-    return [settings, *(each for part in within for each in parts_of(part))]
+    """The first drawn scenarios."""
+    return [draw_scenario(np.random.default_rng(number), few_kernels) for number in range(count)]
 
 
 def test_every_setting_is_drawn_and_takes_values_of_all_its_kinds():
-    seen = {}
-    for drawn in scenarios(400):
-        for kind, fields in FIELDS.items():
-            for part in parts_of(drawn.scenario):
-                if isinstance(part, kind):
-                    for field in fields:
-                        seen.setdefault((kind, field), set()).add(getattr(part, field))
-    for kind, fields in FIELDS.items():
-        assert set(fields) | DRAWN_OTHERWISE.get(kind, set()) == {f.name for f in dataclasses.fields(kind)}
-        for field, values in fields.items():
-            if isinstance(values, Numbers):
-                numbers = {v for v in seen[kind, field] - set(values.also) if math.isfinite(v)}
-                least = max(values.least, min(values.usual_least, 1.0))
-                assert len(numbers) > 5 and min(numbers) <= least and set(values.also) <= seen[kind, field]
+    """Every member of a Literal, None and numbers where both may be, and ends of ranges."""
+    seen = {path: set() for path in leaves(Scenario)}
+    for drawn in scenarios(250):
+        for path, values in seen.items():
+            values.add(reduce(getattr, path, drawn.scenario))
+    for path, values in seen.items():
+        hint = annotations_of(type(reduce(getattr, path[:-1], BOX)))[path[-1]]
+        kinds = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+        for kind in kinds:
+            if get_origin(kind) is Literal:
+                assert set(get_args(kind)) <= values, path
+            elif kind is NoneType:
+                assert None in values, path
             else:
-                assert set(values) == seen[kind, field], field
+                numbers = [each for each in values if not isinstance(each, str | None)]
+                assert len(numbers) > 1, path
+    assert {1e-4, 1e6, math.inf} & seen["robot", "reach_m"] and len(
+        {d.scenario.extra_kinds for d in scenarios(9)}
+    ) > 1
 
 
 def test_a_number_gives_the_same_scenario_again():
@@ -84,7 +58,7 @@ def test_a_number_gives_the_same_scenario_again():
 def test_few_kernels_means_few_kinds_of_observation():
     names = ("panorama", "self_state", "team", "patch", "overview", "action_mask")
     kinds = {tuple(getattr(d.scenario.observation, n) for n in names) for d in scenarios(40, True)}
-    assert len(kinds) == 2
+    assert 2 <= len(kinds) <= 4
     assert len({tuple(getattr(d.scenario.observation, n) for n in names) for d in scenarios(40)}) > 8
 
 
@@ -95,14 +69,16 @@ def test_what_breaks_a_promise_is_found():
     assert check(env, observations, rewards, 0.0) == 0.0
     with pytest.raises(BrokenPromiseError, match="time ran from 1"):
         check(env, observations, rewards, 1.0)
-    with pytest.raises(BrokenPromiseError, match="reward of robot_1 is nan"):
+    with pytest.raises(BrokenPromiseError, match="a reward is not finite: nan"):
         check(env, observations, {**rewards, "robot_1": math.nan}, 0.0)
     env.missions.state.robots["goal"][0, 1, 2] = math.inf
-    with pytest.raises(BrokenPromiseError, match=r"robots\.goal\[0, 1, 2\] = inf"):
+    with pytest.raises(RecordError, match=r"robots\.goal\[0, 1, 2\] = inf"):
         check(env, observations, rewards, 0.0)
     observations["robot_0"]["self"] = np.full_like(observations["robot_0"]["self"], math.nan)
+    with pytest.raises(BrokenPromiseError, match="robot_0 observed is not in its space"):
+        check(env, observations, rewards, 0.0)
     env.missions.observations[0, 0, 3] = math.nan
-    with pytest.raises(BrokenPromiseError, match=r"nan.* at 3 of .* outside its space"):
+    with pytest.raises(BrokenPromiseError, match=r"nan.* at \[0, 0, 3\] of .* outside its space"):
         check(env, observations, rewards, 0.0)
 
 

@@ -37,11 +37,14 @@ def test_a_sound_step_passes():
         (lambda s: s.before[0]["end"].fill(1), "did not begin at 0 s"),
         (lambda s: s.before[1]["entropy_bits"].__iadd__(1.0), "bits gained"),
         (lambda s: s.now[1]["own_bits"].__iadd__(1.0), "bits gained"),
-        (lambda s: s.stepped[1].fill(np.nan), "rewards"),
-        (lambda s: s.stepped[4]["reward_robots"].fill(np.inf), "rewards"),
+        (lambda s: s.stepped[1].fill(np.nan), "reward is not finite"),
+        (lambda s: s.stepped[4]["reward_robots"].fill(np.inf), "reward is not finite"),
         (lambda s: s.stepped[2].fill(True), "missions end"),
         (lambda s: s.now[0]["end"].fill(1), "missions end"),
-        (lambda s: s.env.missions.observations[1, 0, 5:7].fill(np.nan), "2 numbers of observations"),
+        (
+            lambda s: s.env.missions.observations[1, 0, 5:7].fill(np.nan),
+            "outside its space",
+        ),
     ],
 )
 def test_a_broken_promise_is_found(spoil, said):
