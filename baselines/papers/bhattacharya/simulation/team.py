@@ -184,13 +184,15 @@ class Simulation:
         count = 1 if rules.perfect or known else robots
         beliefs = [GridBelief(occupied.shape) for _ in range(count)]
         self.planners = [Planner(belief, rules, robots) for belief in beliefs]
+        self._shared = count == 1
+        self._planner_of = self.planners * robots if self._shared else self.planners
         self._scanner = Scanner(occupied, rules.range_cells)
         self._still_iterations = 0
         self._last_heard_at = np.tile(self.places, (robots, 1))
         self._paths: list[np.ndarray] = [np.zeros(0, np.int64)] * robots
         self._wants_to_see = [False] * robots
         self._rng = np.random.default_rng(seed)
-        buffers = 0 if count == 1 else robots
+        buffers = 0 if self._shared else robots
         self._sensing = [Readings(occupied.size) for _ in range(buffers)]
         self._broadcast = [Readings(occupied.size) for _ in range(buffers)]
         self._received = np.ones((robots, robots), bool)
@@ -247,34 +249,31 @@ class Simulation:
         counts = [int(planner.uncertain.sum()) for planner in self.planners]
         trace.uncertain.append(max(counts))
         self._still_iterations = 0 if moved or not explored else self._still_iterations + 1
-        return self._still_iterations < (
-            1 if len(self.planners) == 1 else 2 * self.rules.phase
-        )  # messages may be in flight
+        return self._still_iterations < (1 if self._shared else 2 * self.rules.phase)  # of messages in flight
 
     def _known_places(self, robot: int) -> np.ndarray:
         """Return (A,) where a robot believes the team to be."""
-        if len(self.planners) == 1:
+        if self._shared:
             return self.places
         self._last_heard_at[robot, robot] = self.places[robot]
         return self._last_heard_at[robot]
 
     def _scan_and_broadcast(self, iteration: int) -> None:
         """Let all robots scan, and broadcast in phases where messages are not perfect."""
-        robots = len(self.places)
-        if iteration % self.rules.phase == 0 and len(self.planners) > 1:
-            for robot in range(robots):  # swap the buffers
+        robots = range(len(self.places))
+        if iteration % self.rules.phase == 0 and not self._shared:
+            for robot in robots:  # swap the buffers
                 self._broadcast[robot].clear()
                 both = self._sensing[robot], self._broadcast[robot]
                 self._broadcast[robot], self._sensing[robot] = both
                 self._received[robot] = not self._broadcast[robot].times.any()
-        for robot in range(robots):
-            scan = self._scanner.scan(int(self.places[robot]))
-            self.planners[robot if len(self.planners) > 1 else 0].belief.fuse_scan(scan)
-            if len(self.planners) > 1:
+        for robot, place in enumerate(self.places):
+            scan = self._scanner.scan(int(place))
+            self._planner_of[robot].belief.fuse_scan(scan)
+            if not self._shared:
                 self._sensing[robot].add(scan)
-        if len(self.planners) > 1:
-            for robot in range(robots):
-                self._send(robot)
+        for robot in () if self._shared else robots:
+            self._send(robot)
 
     def _send(self, sender: int) -> None:
         """Broadcast a buffer and a position; a robot that has received the buffer ignores it."""
@@ -289,7 +288,7 @@ class Simulation:
 
     def _step_of(self, robot: int) -> int:
         """Return the cell to which a robot steps in this iteration."""
-        planner, place = self.planners[robot if len(self.planners) > 1 else 0], int(self.places[robot])
+        planner, place = self._planner_of[robot], int(self.places[robot])
         if self.rules.keeps_targets and not planner.explored and self._keeps_target(planner, robot):
             step = int(self._paths[robot][0])
         else:
@@ -298,11 +297,11 @@ class Simulation:
                 step = planner.covering_step(robot, place)
             else:
                 target = int(planner.targets[robot])
-                self._paths[robot] = (
-                    planner.path_to(target)[1:] if target != UNREACHED else self._paths[robot][:0]
-                )
-                self._wants_to_see[robot] = target != UNREACHED and self._uncertain(planner, target)
-                step = int(self._paths[robot][0]) if len(self._paths[robot]) else place
+                reached = target != UNREACHED
+                path = planner.path_to(target)[1:] if reached else self._paths[robot][:0]
+                self._paths[robot] = path
+                self._wants_to_see[robot] = reached and self._uncertain(planner, target)
+                step = int(path[0]) if len(path) else place
         if step != place and not step_is_free(~self.occupied, place, step):
             step = place  # the next cell was not known to be occupied
             self._paths[robot] = self._paths[robot][:0]
