@@ -186,10 +186,9 @@ def record_mission(
         after_step: Called after the reset and after every step.
 
     Returns:
-        The mission's figures; `half_s`, when the best map had lost half of H(0) - H_th; `sent_by_scan` and
-        `depth_by_scan_m`, measurements sent after each of the team's scans and how far it looked;
-        `apart_m`, the robots' mean distance from each other; and `series`: time, entropy of the best map
-        and measurements sent so far at up to 200 moments.
+        The mission's figures; `half_s`, when the best map had lost half of H(0) - H_th; `sent_by_scan`,
+        measurements sent after each of the team's scans; `apart_m`, the robots' mean distance from each
+        other; and `series`: time, entropy of the best map and measurements sent so far at up to 200 moments.
     """
     recorder = Recorder(env.missions)
 
@@ -205,12 +204,10 @@ def record_mission(
     halved = np.flatnonzero(best <= middle)
     rows = recorder.sampled_moments(_SERIES_POINTS)
     single = np.flatnonzero(np.diff(recorder.scans) == 1)
-    scanned = np.diff(recorder.robot_scans, axis=0)[single].argmax(axis=1)
     return {
         **figures,
         "half_s": float(recorder.time_s[halved[0]]) if len(halved) else None,
         "sent_by_scan": np.diff(recorder.shared)[single].tolist(),
-        "depth_by_scan_m": np.round(recorder.depths_m[1:][single, scanned], 3).tolist(),
         "apart_m": round(_mean_distance_apart_m(recorder.scan_positions_m[1:]), 3),
         "series": {
             "time_s": np.round(recorder.time_s[rows], 3).tolist(),

@@ -94,8 +94,6 @@ class Moment(NamedTuple):
     """(A, 3) float64 where each robot took its latest scan."""
     poses: np.ndarray
     """(A, 5) float64 of each robot: x, y, z, yaw, pitch."""
-    depth_m: np.ndarray
-    """(A,) float64 mean measured distance of each robot's latest scan."""
 
 
 class Recorder:
@@ -122,7 +120,6 @@ class Recorder:
             bits_sent=int(robots["bits_sent"].sum()),
             scan_positions_m=robots["scan_pose"][:, :3].copy(),
             poses=poses_now(self.missions, 0),
-            depth_m=robots["depth_m"].copy(),
         )
         self._moments.append(moment)
         self._paths.update(self.missions)
@@ -165,11 +162,6 @@ class Recorder:
     def bits_sent(self) -> np.ndarray:
         """(T,) int64 bits that the team has sent since the reset."""
         return np.array([moment.bits_sent for moment in self._moments])
-
-    @property
-    def depths_m(self) -> np.ndarray:
-        """(T, A) float64 mean measured distance of each robot's latest scan."""
-        return np.stack([moment.depth_m for moment in self._moments])
 
     @property
     def scan_positions_m(self) -> np.ndarray:

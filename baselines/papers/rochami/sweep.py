@@ -20,6 +20,7 @@ TEAMS = tuple(range(2, 11))
 FEW = (2, 4, 8)
 """Team sizes with one thing changed at a time."""
 QUICK_KAPPAS = (0.25, 1.0)
+KAPPAS = (0.25, 1.0)
 KAPPA_CHANGES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
     "entropy": ("a voxel counts as known at σ = 0.03 instead of 0.2", {}, {"known_sigma": 0.03}),
     "reach": ("candidates at most 1 m away", {"robot": {"reach_m": 1.0}}, {}),
@@ -114,10 +115,8 @@ def cell_id(robots: int, method: str, blocked: str = "wait") -> str:
     return f"n{robots}-{method}-{blocked}"
 
 
-def kappa_id(kappa: float, change: str | None = None) -> str:
-    """Name of the cell with this cost sensitivity, and maybe with one thing changed."""
-    if change is not None:
-        return f"kappa-{kappa:g}-{change}"
+def kappa_id(kappa: float) -> str:
+    """Name of the cell with this cost sensitivity."""
     return f"kappa-{kappa:g}" if kappa > 0.0 else cell_id(2, "coordinated")
 
 
@@ -151,14 +150,8 @@ def experiment(amount: Amount) -> list[CellTrial]:
                 cells.append(_cell(name, settings, method, starts, covered=covered))
         short = _merged({"robots": robots}, _changed(reach_m=1.0))
         cells.append(_cell(f"n{robots}-random-1m", short, "random", starts))
-    for name, (_, settings, coordination_settings) in () if quick else KAPPA_CHANGES.items():
-        for kappa in (0.0, 0.25, 1.0):
-            changed = _merged({"robots": 2}, settings)
-            cost = {**coordination_settings, "distance_cost": kappa}
-            cells.append(_cell(kappa_id(kappa, name), changed, "coordinated", starts, cost))
     for kappa in QUICK_KAPPAS if quick else KAPPAS[1:]:
-        coordination_settings = {"distance_cost": kappa}
-        cells.append(_cell(kappa_id(kappa), {"robots": 2}, "coordinated", starts, coordination_settings))
+        cells.append(_cell(kappa_id(kappa), {"robots": 2}, "coordinated", starts, {"distance_cost": kappa}))
     for name in ("bodies", "reach") if quick else CHANGES:
         for robots in FEW:
             for method in METHODS[:2] if CHANGES[name].both else METHODS[:1]:

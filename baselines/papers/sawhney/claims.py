@@ -274,10 +274,9 @@ def changed_table(records: Records) -> str:
     rows = []
     for part in PARTS:
         changes = changes_in(records, part)
-        betas = [method for method in CHANGED_METHODS[part] if method.startswith("beta-")]
         worlds = next(iter(changes.values()), ())
         for change in (None, *changes) if changes else ():
-            pairs = [_changed(records, change, beta, worlds) for beta in betas]
+            pairs = [_changed(records, change, beta, worlds) for beta in CHANGED_METHODS[1:]]
             ratio = ratio_interval(*min(pairs, key=lambda pair: pair[1].mean()))
             text = "as it is" if change is None else CHANGES[part][change].text
             rows.append([f"{PARTS[part]}, {text}", f"{ratio:.2f}"])

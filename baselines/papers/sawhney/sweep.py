@@ -98,10 +98,7 @@ CHANGES: dict[str, dict[str, Change]] = {
     },
 }
 """What is changed in plans, and over terrain."""
-CHANGED_METHODS = {
-    "plans": ("ptv", "beta-5", "beta-20", "sync", "naive"),
-    "terrains": ("ptv", "beta-5", "beta-20", "sync", "naive", "no-height"),
-}
+CHANGED_METHODS = ("ptv", "beta-5", "beta-20")
 CHANGED_IN = {"plans": PLANS, "terrains": TERRAINS}
 QUICK_CHANGED_IN = {"plans": ("office",), "terrains": ("terrain",)}
 
@@ -156,7 +153,7 @@ def experiment(amount: Amount) -> list[CellTrial]:
         cells.append(replace(cell, id=cell_id(f"map-{file.stem}", MAP_TEAM, method)))
     for part, changes in CHANGES.items():
         worlds = (QUICK_CHANGED_IN if quick else CHANGED_IN)[part]
-        for name, world, method in product(changes, worlds, CHANGED_METHODS[part]):
+        for name, world, method in product(changes, worlds, CHANGED_METHODS):
             change = changes[name]
             exploring = {**methods(part, False)[method], **change.exploring}
             frontiers = exploring.get("frontiers", FrontierConfig())
