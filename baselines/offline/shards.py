@@ -1,4 +1,4 @@
-"""Missions written as Parquet, some of them in each file, in row groups: memory holds one group at a time."""
+"""Missions written as Parquet, in each file a row group a mission: memory holds one mission at a time."""
 # pyright: reportMissingImports=false
 
 from __future__ import annotations
@@ -17,9 +17,6 @@ from baselines.experiments.trials import Cell, CellTrial, described
 from baselines.offline.recorded_env import Row, record_mission, recorded_env
 from baselines.offline.schema import schema_of
 from entropy_explore_env.settings.scenario import Scenario
-
-GROUP_ROWS = 4096
-"""Rows of a row group."""
 
 
 @dataclass(frozen=True)
@@ -83,49 +80,16 @@ class Shard:
         env = recorded_env(self.scenario, self.surroundings)
         self.path.parent.mkdir(parents=True, exist_ok=True)
         unfinished = self.path.with_name(f".{self.path.name}.{os.getpid()}")
-        counts = {"missions": self.missions, "decisions": 0}
+        counts = {"missions": self.missions, "decisions": 0, "rows": 0}
+        schema = schema_of(self.scenario, self.strategy)
         try:
-            with RowGroups(unfinished, schema_of(self.scenario, self.strategy)) as groups:
+            with pq.ParquetWriter(unfinished, schema, compression="zstd") as writer:
                 for seed in range(self.seed, self.seed + self.missions):
-                    counts["decisions"] += record_mission(env, self.strategy, seed, groups.add)
+                    rows: list[Row] = []
+                    counts["decisions"] += record_mission(env, self.strategy, seed, rows.append)
+                    counts["rows"] += len(rows)
+                    writer.write_table(pa.Table.from_pylist(rows, schema))
             unfinished.replace(self.path)
         finally:
             unfinished.unlink(missing_ok=True)
-        return {**counts, "rows": groups.rows, "bytes": self.path.stat().st_size}
-
-
-class RowGroups:
-    """A Parquet file that grows by row groups.
-
-    Attributes:
-        rows: How many rows were added so far.
-    """
-
-    def __init__(self, path: Path, schema: pa.Schema) -> None:
-        """Begin the file."""
-        self.rows = 0
-        self._schema, self._group = schema, []
-        self._writer = pq.ParquetWriter(path, schema, compression="zstd")
-
-    def __enter__(self) -> RowGroups:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        try:
-            if self._group and error[0] is None:
-                self._write()
-        finally:
-            self._writer.close()
-
-    def add(self, row: Row) -> None:
-        """Add a row; a group that is full is written."""
-        self._group.append(row)
-        self.rows += 1
-        if len(self._group) == GROUP_ROWS:
-            self._write()
-
-    def _write(self) -> None:
-        columns = [[row[field.name] for row in self._group] for field in self._schema]
-        arrays = [pa.array(column, field.type) for column, field in zip(columns, self._schema, strict=True)]
-        self._writer.write_batch(pa.record_batch(arrays, schema=self._schema), row_group_size=GROUP_ROWS)
-        self._group.clear()
+        return {**counts, "bytes": self.path.stat().st_size}
