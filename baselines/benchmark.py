@@ -22,7 +22,7 @@ from typing import Annotated, ClassVar
 
 from baselines.cli.arguments import given_values, make_folder, parse, print_json, run_command, told_command
 from baselines.cli.options import Mark
-from baselines.cli.task_options import TaskOptions, given_in, is_of_task, is_whole_scenario
+from baselines.cli.task_options import TaskOptions, is_whole_scenario
 from baselines.cli.worker_options import TrialOptions
 from baselines.experiments.rows import read_table
 from baselines.experiments.trials import run_trials
@@ -151,16 +151,16 @@ def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
         limit_s = getattr(args, name)
         if limit_s is not None and not least <= limit_s < math.inf:
             raise SettingError(name, limit_s, "a number > 0" if least else "a number ≥ 0")
+    given_all = given_values(Args, words)
+    given = given_all.get("task", {})
     if args.suite is not None:
         suite_strategies(args.suite)  # refuses an unknown suite first
-        for name in given_in(words):
-            if name in _PINNED or is_of_task(name):
-                raise SettingError(name, "given", "no value beside --suite, which pins it")
+        for name in (*given, *(name for name in _PINNED if name in given_all)):
+            raise SettingError(name, "given", "no value beside --suite, which pins it")
         return find_suite(args.suite, args.quick, chosen_strategies(args.strategies, args.suite)), []
     if args.world_scenario is not None and args.world_scenario not in SCENARIOS:
         raise SettingError("world_scenario", args.world_scenario, one_of(args.world_scenario, SCENARIOS))
     strategies = chosen_strategies(args.strategies)
-    given = given_values(Args, words).get("task", {})
     robots, names, refused = args.robots or default_sizes(args.task, args.quick), args.scenarios, []
     if is_whole_scenario(args.task.settings):
         if names is not None:

@@ -5,12 +5,11 @@ Of a bag of ROS it plays the maps through a strategy: `python -m baselines.repla
 Takes the record that `baselines.run --record FILE` (or `--out`) wrote, gives the environment the same
 commands, compares the state at the end with the record's digest, and draws the mission anew. Exit code 1
 where the end differs: another version of the library, or another machine's arithmetic. A record holds its
-settings: options of a task, such as `--settings` or `--robots`, are refused.
+settings: there are no options of a task, such as `--settings` or `--robots`.
 """
 
 from __future__ import annotations
 
-import itertools
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -23,12 +22,10 @@ from baselines import bag_replay
 from baselines.bag_replay import BagArgs, is_bag, replay_bag
 from baselines.cli.arguments import parse, run_command
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
-from baselines.cli.options import Also, Mark
+from baselines.cli.options import Mark
 from baselines.cli.progress import progress_bar
-from baselines.cli.task_options import is_of_task
 from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.mission_record import (
     MissionRecord,
     check_world,
@@ -40,9 +37,6 @@ from entropy_explore_env.reports.mission_record import (
 from entropy_explore_env.version import VERSION
 
 _DIFFERS = 1
-_OWN = ("world", "world_file", "read_memory_mib")
-"""Options that a task has, too, and that change no setting here."""
-_OF_A_MISSION = ("robots", "seed", "strategy", "scenario")
 
 
 @dataclass
@@ -51,7 +45,7 @@ class Args:
 
     record: Annotated[Path, Mark.POSITIONAL] = Path("mission.npz")
     """A mission record, mission.npz."""
-    world_file: Annotated[str | None, Also("--world")] = None
+    world_file: str | None = None
     """Where the world's file lies now, if it was moved."""
     read_memory_mib: float | None = None
     """MiB of memory that reading a world file may take; default: by the file's size."""
@@ -64,7 +58,6 @@ def main(words: Sequence[str]) -> int:
     """Run the command."""
     if is_bag(words):
         return replay_bag(parse(BagArgs, words, description=bag_replay.__doc__))
-    _refuse_settings(words)
     args = parse(Args, words, description=__doc__)
     allow_read_memory(args.read_memory_mib)
     record = load_record(args.record)
@@ -86,18 +79,6 @@ def main(words: Sequence[str]) -> int:
     if not args.output.json:
         print("replayed bit for bit: the end state is the record's")
     return 0
-
-
-def _refuse_settings(words: Sequence[str]) -> None:
-    """Raise a SettingError for the first option that would set what a record holds."""
-    for word, following in itertools.zip_longest(words, words[1:], fillvalue="--"):
-        option, _, value = word.partition("=")
-        name = option.removeprefix("--").replace("-", "_")
-        refused = name in _OF_A_MISSION or is_of_task(name)
-        if name in _OWN or not (option.startswith("--") and refused):
-            continue
-        given = value or (None if following.startswith("--") else following)
-        raise SettingError(name, given, "no value: a record holds its settings")
 
 
 def _replayed(

@@ -16,9 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cpuinfo import get_cpu_info
+
 from baselines.cli.arguments import parse, print_json, run_command
-from baselines.experiments.machine import processor
-from baselines.experiments.tables import markdown_table
+from baselines.experiments.tables import markdown_table, terminal_table
 from benchmarks.deciding import deciding_rows, mission_rows, plan_rows
 from benchmarks.fusion import fusion_rows
 from benchmarks.learning import learning_rows
@@ -89,7 +90,8 @@ def main(words: Sequence[str]) -> int:
     if args.json:
         print_json({"machine": about, "rows": [dataclasses.asdict(row) for row in rows]})
     else:
-        print_table(about, rows)
+        print(terminal_table(COLUMNS, [cells(row) for row in rows]))
+        print(sentence(about))
     return GOAL_MISSED if args.strict and any(row.holds is False for row in rows) else 0
 
 
@@ -111,7 +113,7 @@ def machine() -> dict[str, Any]:
     """Return what the figures were measured on."""
     usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
-        "processor": processor(),
+        "processor": get_cpu_info().get("brand_raw") or "unknown",
         "cores": usable,
         "load_1_min": round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None,
         "system": f"{platform.system()} {platform.machine()}",
@@ -145,21 +147,6 @@ def sentence(about: dict[str, Any]) -> str:
         f"{about['processor']}, {about['cores']} cores (load {about['load_1_min']} at the end), "
         f"{about['system']}, Python {about['python']}; {packages}."
     )
-
-
-def print_table(about: dict[str, Any], rows: Sequence[Row]) -> None:
-    """Print the table and the machine on standard output."""
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(title="Speed beside peers", title_justify="left")
-    for name in COLUMNS:
-        table.add_column(name, justify="left" if name in ("job", "peer", "holds") else "right")
-    for row in rows:
-        table.add_row(*cells(row), style="red" if row.holds is False else "")
-    console = Console()
-    console.print(table)
-    console.print(sentence(about), highlight=False)
 
 
 def markdown(about: dict[str, Any], rows: Sequence[Row], only: str | None = None) -> str:

@@ -52,7 +52,7 @@ def options_of_command(module: str, words: list[str]) -> set[str]:
     file = importlib.import_module(module if _file(module).is_file() else f"{module}.__main__")
     classes = [getattr(file, name) for name in ("Args", "BagArgs") if hasattr(file, name)]
     options = [option for args in classes for option in options_of(args, args())]
-    return {flag for option in options for flag in (option.flag, option.opposite, *option.also)}
+    return {flag for option in options for flag in (option.flag, option.opposite)}
 
 
 def _file(module: str) -> Path:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import difflib
 import json
 import re
 import shlex
@@ -22,7 +21,7 @@ from baselines.cli.help import help_text
 from baselines.cli.options import Option, options_of
 from entropy_explore_env import command
 from entropy_explore_env.command import LineParser, UsageError
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, did_you_mean
 from entropy_explore_env.worlds.given import distinct_paths
 
 Arguments = TypeVar("Arguments")
@@ -88,7 +87,9 @@ def _given(options: Iterable[Option], words: Sequence[str]) -> dict[str, Any]:
         _add(parser, option)
     found, unknown = parser.parse_known_intermixed_args([_spelled(word) for word in words])
     if unknown and unknown[0].startswith("-"):
-        raise UsageError(f"{unknown[0]}: no such option{_meant(unknown, options) or '; see --help'}")
+        flags = [option.flag for option in options if not option.positional]
+        meant = did_you_mean(unknown[0].partition("=")[0], flags) or "; see --help"
+        raise UsageError(f"{unknown[0]}: no such option{meant}")
     if unknown:
         raise UsageError(f"{unknown[0]}: expected an option; see --help")
     tree: dict[str, Any] = {}
@@ -121,7 +122,7 @@ def _add(parser: argparse.ArgumentParser, option: Option) -> None:
         parser.add_argument(option.flag, dest=option.name, action="store_const", const=True)
         parser.add_argument(option.opposite, dest=option.name, action="store_const", const=False)
     else:
-        parser.add_argument(option.flag, *option.also, dest=option.name, nargs=values.count, type=read)
+        parser.add_argument(option.flag, dest=option.name, nargs=values.count, type=read)
 
 
 def _joined(option: Option, value: Any) -> Any:  # noqa: ANN401
@@ -133,44 +134,6 @@ def _joined(option: Option, value: Any) -> Any:  # noqa: ANN401
         return joined(value)
     except ValueError as error:
         raise UsageError(f"{option.flag}: expected {error}; see --help {option.name}") from None
-
-
-_ALIKE = 0.6
-"""Least likeness of a flag that may be meant."""
-
-
-def _meant(words: Sequence[str], options: Iterable[Option]) -> str:
-    """Return the end of a message: the flag most like an unknown one.
-
-    Flags with its prefix come first, and those that take the word that follows it.
-    """
-    flag, equals, value = words[0].partition("=")
-    following = value if equals else next(iter(words[1:]), None)
-    best, score = "", 0.0
-    for option in options:
-        prefix, _, last = option.flag.rpartition(".")
-        alike = max(_likeness(flag, option.flag), _likeness(flag.rpartition(".")[2], last))
-        if option.positional or alike < _ALIKE:
-            continue
-        alike += 0.2 * (flag.rpartition(".")[0] == prefix) + 0.1 * _takes(option, following)
-        if alike > score:
-            best, score = option.flag, alike
-    return f"; did you mean {best}?" if best else ""
-
-
-def _likeness(one: str, other: str) -> float:
-    return difflib.SequenceMatcher(None, one.strip("-"), other.strip("-")).ratio()
-
-
-def _takes(option: Option, word: str | None) -> bool:
-    """Return whether an option takes a word, or none where none follows."""
-    if word is None or option.kind is bool:
-        return word is None and option.kind is bool
-    try:
-        option.values.read(word)
-    except ValueError:
-        return False
-    return True
 
 
 def overlaid(base: Any, changes: Mapping[str, Any]) -> Any:  # noqa: ANN401 - any dataclass
@@ -241,27 +204,3 @@ def told_command(command: str, words: Sequence[str], leave_out: Sequence[str]) -
     files = [word for word in told if Path(word).expanduser().is_file()]
     names = dict(zip(files, distinct_paths([Path(file) for file in files]), strict=True))
     return " ".join([command, shlex.join(names.get(word, word) for word in told)]).strip()
-
-
-def given_options(args: Any, leave_out: Sequence[str] = ()) -> list[str]:  # noqa: ANN401 - any dataclass
-    """Return options that differ from their defaults as words of a command line; of paths, the name.
-
-    Args:
-        args: A dataclass of options.
-        leave_out: Names of fields.
-    """
-    words: list[str] = []
-    for each in dataclasses.fields(args):
-        value = getattr(args, each.name)
-        if each.name in leave_out or value == each.default:
-            continue
-        words.append("--" + each.name.replace("_", "-"))
-        if value is not True:
-            words += [_word(part) for part in (value if isinstance(value, tuple) else (value,))]
-    return words
-
-
-def _word(value: object) -> str:
-    if isinstance(value, Path):
-        return value.name
-    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -115,7 +115,7 @@ def _typed(option: Option) -> str:
         return f"{option.flag}, {option.opposite}" if option.default is True else option.flag
     shown, count = option.values.shown, option.values.count
     words = f"{shown} ..." if count == "*" else " ".join([shown] * int(count or 1))
-    return f"{', '.join((option.flag, *option.also))} {words}"
+    return f"{option.flag} {words}"
 
 
 def _upper(option: Option) -> str:

@@ -27,13 +27,6 @@ class Mark(Enum):
     POSITIONAL = "the option is a word without a flag"
 
 
-@dataclass(frozen=True)
-class Also:
-    """`Annotated[…, Also("--world")]` gives an option a second flag."""
-
-    flag: str
-
-
 class Values(NamedTuple):
     """The words that an option takes, and how they become its value."""
 
@@ -67,7 +60,6 @@ class Option:
         owner: The dataclass that has it as a field.
         notes: What the help says of it after the field's own text.
         positional: Whether it has no flag.
-        also: Further flags.
     """
 
     path: tuple[str, ...]
@@ -78,7 +70,6 @@ class Option:
     owner: type
     notes: tuple[str, ...] = ()
     positional: bool = False
-    also: tuple[str, ...] = ()
 
     @property
     def flag(self) -> str:
@@ -139,9 +130,8 @@ def _options_of(
             yield from _options_of(hint, value, here, inner, within)  # type: ignore[arg-type]
             continue
         said = tuple(note for note in notes if isinstance(note, str))
-        also = tuple(note.flag for note in notes if isinstance(note, Also))
         name = prefix + field.name
-        yield Option(here, name, part, hint, value, kind, said, Mark.POSITIONAL in notes, also)
+        yield Option(here, name, part, hint, value, kind, said, Mark.POSITIONAL in notes)
 
 
 @cache

@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from tabulate import tabulate
+
 from baselines.strategies import shown_name
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import counted
@@ -157,14 +159,8 @@ def _moved_m(scenario: Scenario) -> float:
 
 def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario) -> None:
     """Print what a mission came to, and the files that were written."""
-    from rich.console import Console
-    from rich.table import Table
-
     team = counted(figures["robots"], "robot")
     print(f"{named(figures)}, {shown_name(figures['strategy'])}, {team}, seed {figures['seed']}")
-    table = Table(show_header=False)
-    table.add_column(style="dim")
-    table.add_column(justify="right")
     marks = (figures["t50_s"], figures["t90_s"], figures["t99_s"])
     reached = ", ".join("-" if mark is None else f"{mark:,.0f}" for mark in marks)
     none = all(mark is None for mark in marks)
@@ -173,16 +169,14 @@ def print_table(figures: dict[str, Any], written: list[Path], scenario: Scenario
     values |= {"reached": "-" if none else reached + " s"}
     values["joint_bits"] = joint.get("entropy_bits")
     values["faults_told"] = _told(figures.get("faults", {}))
-    for label, shown in _setting(scenario):
-        table.add_row(label, shown)
+    rows = list(_setting(scenario))
     for label, name, shown in _ROWS:
         alone = figures["robots"] == 1 and name in _OF_TEAMS
         partial = name == "scans_over_floor" and not figures["finished"]  # the floor is a whole map's
         if values.get(name) is not None and not alone and not partial:
-            table.add_row(label, shown(values[name]))
-    console = Console()
-    console.print(table)
+            rows.append((label, shown(values[name])))
+    print(tabulate(rows, disable_numparse=True, colalign=("left", "right")))
     for warning in standing_still(figures, _moved_m(scenario)):
-        console.print(warning, style="yellow", highlight=False, soft_wrap=True)
+        print(warning)
     if written:
-        console.print(f"written: {', '.join(map(str, written))}", highlight=False, soft_wrap=True)
+        print(f"written: {', '.join(map(str, written))}")

@@ -75,19 +75,6 @@ class TaskOptions:
     """Simulated seconds until a mission is cut off; short for --ending.time-limit-s."""
 
 
-def given_in(words: Sequence[str]) -> list[str]:
-    """Return the names of the options that a command line gives, in order, such as `channel.burst`."""
-    options = (word[2:].split("=")[0] for word in words if word.startswith("--"))
-    return [option.replace("-", "_") for option in options]
-
-
-def is_of_task(option: str) -> bool:
-    """Return whether an option of a command line, as `given_in` has it, is one of a task."""
-    names = {each.name for kind in (TaskOptions, Reading) for each in dataclasses.fields(kind)}
-    first = option.split(".")[0]
-    return first in names or first.removeprefix("no_") in names
-
-
 class TaskArguments(Protocol):
     """The arguments of a command that runs missions; a dataclass."""
 

@@ -1,4 +1,4 @@
-"""Claims of a paper beside what was measured, as people read them: in the terminal, and in Markdown."""
+"""Claims of a paper beside what was measured, as people read them: in a terminal, and in Markdown."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from baselines.experiments.statistics import Interval
-from baselines.experiments.tables import csv_table, markdown_table
+from baselines.experiments.tables import csv_table, markdown_table, terminal_table
 from entropy_explore_env.errors import SettingError
 
 _DIGITS = 4
 """Significant digits of figures below 1000; above, whole numbers."""
 _FEW = 3
 """Figures of a paper that stand in a line of a group of claims."""
+_YES_NO = {True: "yes", False: "no"}
 COLUMNS = ("id", "claim", "paper", "ours", "low", "high", "holds")
 """Of claims as JSON and CSV."""
 SAME = "the number"
@@ -130,21 +131,20 @@ def claims_csv(claims: Sequence[Claim]) -> str:
     return csv_table({name: [getattr(claim, name) for claim in claims] for name in COLUMNS})
 
 
-def print_claims(claims: Sequence[Claim], paper: str) -> None:
-    """Print a table of the claims."""
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(title=paper, title_justify="left")
-    table.add_column("id", overflow="fold")
-    table.add_column("claim")
-    for head in ("paper", "ours", "95 % interval"):
-        table.add_column(head, justify="right")
-    table.add_column("holds")
-    for claim in claims:
-        holds = "[green]yes[/green]" if claim.holds else "[red]no[/red]"
-        table.add_row(claim.id, claim.claim, _shown(claim.paper), _shown(claim.ours), _interval(claim), holds)
-    Console().print(table)
+def terminal_claims(claims: Sequence[Claim]) -> str:
+    """Return a table of the claims for a terminal."""
+    rows = [
+        [
+            each.id,
+            each.claim,
+            _shown(each.paper),
+            _shown(each.ours),
+            _interval(each),
+            "yes" if each.holds else "no",
+        ]
+        for each in claims
+    ]
+    return terminal_table(["id", "claim", "paper", "ours", "95 % interval", "holds"], rows)
 
 
 def _shown(value: float | str | None, digits: int = _DIGITS) -> str:

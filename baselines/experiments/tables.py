@@ -36,6 +36,11 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str
     return text + "\n"
 
 
+def terminal_table(head: Sequence[str], rows: Sequence[Sequence[object]], widest: int = 60) -> str:
+    """Return a table for people at a terminal; texts are wrapped, and cells stand in it as `str` has them."""
+    return tabulate(rows, head, "simple", disable_numparse=True, maxcolwidths=widest, maxheadercolwidths=20)
+
+
 def cells_table(
     names: Sequence[str],
     rows: Iterable[tuple[Sequence[object], str]],

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from baselines.cli.arguments import given_options, make_folder, parse, print_json, run_command
+from baselines.cli.arguments import make_folder, parse, print_json, run_command, told_command
 from baselines.cli.options import Mark
 from baselines.cli.worker_options import TrialOptions
 from baselines.papers import PAPERS
@@ -20,6 +20,9 @@ from entropy_explore_env.errors import SettingError, one_of
 
 if TYPE_CHECKING:
     from baselines.experiments.experiment import Experiment
+
+_NOT_TOLD = ("--out", "--runs", "--jobs", "--cluster", "--json", "--strict", "--rerun", "--since")
+"""Options that a page does not tell."""
 
 
 @dataclass
@@ -57,15 +60,17 @@ def main(words: Sequence[str]) -> int:
     amounts = [each.amount(args.quick, args.seeds, args.worlds) for each in experiments]
     make_folder("out", args.out)
     make_folder("runs", args.runs)
-    from baselines.experiments.claims import print_claims
+    from baselines.experiments.claims import terminal_claims
     from baselines.experiments.experiment import reproduce
 
+    options = [word for word in words if word != args.paper]
+    command = told_command(f"python -m baselines.papers {args.paper}", options, _NOT_TOLD)
     done = {}
     for experiment, amount in zip(experiments, amounts, strict=True):
         table = args.runs / f"{experiment.name}.jsonl"
-        done[experiment.name] = reproduce(experiment, amount, table, how, args.out, command_line(args))
+        done[experiment.name] = reproduce(experiment, amount, table, how, args.out, command)
         if not args.json:
-            print_claims(done[experiment.name].claims, experiment.title)
+            print(f"{experiment.title}\n{terminal_claims(done[experiment.name].claims)}\n")
     if args.json:
         found = {
             name: {"claims": [claim.row() for claim in each.claims], "wall_s": each.wall_s}
@@ -79,12 +84,6 @@ def main(words: Sequence[str]) -> int:
 def find_experiment(name: str) -> Experiment:
     """Return the experiment with a name of PAPERS."""
     return importlib.import_module(PAPERS[name]).EXPERIMENT
-
-
-def command_line(args: Args) -> str:
-    """Return the command that makes the same pages again, wherever the files lie that it reads."""
-    kept = ("paper", "out", "runs", "jobs", "cluster", "json", "strict", "rerun", "since")
-    return " ".join(["python -m baselines.papers", args.paper, *given_options(args, leave_out=kept)])
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from baselines.experiments.tables import terminal_table
 from baselines.strategies import shown_name, shown_names
 from baselines.suites.page import shown, tasks_table
 from baselines.suites.results import Results, Row, failed_rows, overall_rows, task_rows
@@ -30,47 +31,37 @@ def show_results(results: Results, refused: Sequence[str], tables: bool) -> None
         refused: Why world files are refused.
         tables: Print the tables of all tasks, too, in Markdown.
     """
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    measure, reference = results.suite.measures[0], results.reference
+    if tables:
+        print(tasks_table(results))
     own = results.suite.name == "own"
-    title = ", ".join(task.name for task in results.tasks) if own else results.suite.title
-    table = Table(
-        title=f"{title}\nratios: over {reference}'s",
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-        pad_edge=False,
-    )
-    table.add_column("strategy", overflow="fold")
-    for head in ("missions", "finished", measure.words, "ms a\ndecision"):
-        table.add_column(head, justify="right", no_wrap=True)
-    rows = overall_rows(results)
+    print(", ".join(task.name for task in results.tasks) if own else results.suite.title)
+    print(f"ratios: over {results.reference}'s\n")
+    print(_overall_table(results))
+    for row in failed_rows(results):
+        missions = ", ".join(map(str, row["missions"]))
+        where = f"{shown_name(row['strategy'])}, {row['task']}, missions {missions}"
+        print(f"failed: {where}: {row['reason']}{_place_of(results, row)}")
+    for reason in refused:
+        print(f"refused: {reason}")
+    if not any(row["finished"] for row in overall_rows(results)):
+        print("No mission was finished in its time: the ratios say nothing.")
+
+
+def _overall_table(results: Results) -> str:
+    """Return a row for each strategy."""
+    measure, rows = results.suite.measures[0], overall_rows(results)
     names = shown_names(row["strategy"] for row in rows)
-    for row in rows:
-        table.add_row(
+    cells = [
+        [
             names[row["strategy"]],
-            str(row["missions"]),
+            row["missions"],
             "-" if row["finished"] is None else f"{row['finished']:.0%}",
             shown(row[f"{measure.name}_ratio"], ".2f"),
             "-" if row["decision_ms"] is None else f"{row['decision_ms']:.2f}",
-        )
-    console = Console()
-    if tables:
-        print(tasks_table(results))
-    console.print(table)
-    for row in failed_rows(results):
-        missions = ", ".join(map(str, row["missions"]))
-        place = _place_of(results, row)
-        name = shown_name(row["strategy"])
-        line = f"failed: {name}, {row['task']}, missions {missions}: {row['reason']}{place}"
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
-    for reason in refused:
-        console.print(f"refused: {reason}", markup=False, highlight=False, soft_wrap=True)
-    if not any(row["finished"] for row in rows):
-        console.print("No mission was finished in its time: the ratios say nothing.", highlight=False)
+        ]
+        for row in rows
+    ]
+    return terminal_table(["strategy", "missions", "finished", measure.words, "ms a decision"], cells)
 
 
 def _place_of(results: Results, row: Row) -> str:

@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, Literal
 import pytest
 
 from baselines.cli.arguments import parse, print_json, run_command
-from baselines.cli.options import Also, Mark, options_of
+from baselines.cli.options import Mark, options_of
 from entropy_explore_env.command import BAD_INPUT, UsageError
 from entropy_explore_env.errors import SettingError
 
@@ -66,7 +66,7 @@ class Args:
     """How many."""
     most: int | None = None
     """At most."""
-    folder: Annotated[Path | None, Also("--dir")] = None
+    folder: Path | None = None
     """Where."""
     loud: bool = False
     """Whether to shout."""
@@ -79,7 +79,7 @@ class Args:
     [
         ("", Args()),
         ("office --number 5 --folder a/b --loud", Args("office", 5, None, Path("a/b"), True)),
-        ("--number=5 office --dir a --no-loud", Args("office", 5, None, Path("a"))),
+        ("--number=5 office --folder a --no-loud", Args("office", 5, None, Path("a"))),
         ("--number 1 --tags --size 3 4 --number 2", Args(number=2, more=More((), (3, 4)))),
         ("--tags c d -- office", Args("office", more=More(("c", "d")))),
         ("--body.wheel.radius_m 1 --body.no-lights", Args(body=Body(Wheel(1.0), lights=False))),
@@ -144,28 +144,6 @@ def test_words_that_do_not_fit_are_named_in_one_line_and_print_nothing(words, sa
     assert capsys.readouterr() == ("", "")
 
 
-@dataclass(frozen=True)
-class Part:
-    """A part."""
-
-    range_m: float = 1.0
-    range_of: str = ""
-
-
-@dataclass
-class Two:
-    """Two parts."""
-
-    one: Part = field(default_factory=Part)
-    other: Part = field(default_factory=Part)
-
-
-def test_a_flag_that_is_meant_has_the_same_prefix_and_takes_the_value():
-    for word, meant in (("--other.range 2", "--other.range-m"), ("--other.range-mo x", "--other.range-of")):
-        with pytest.raises(UsageError, match=f"did you mean {meant}"):
-            parse(Two, word.split())
-
-
 def test_a_value_that_is_not_allowed_is_the_settings_own_error():
     with pytest.raises(SettingError, match=r"Wheel.radius_m = -1.0"):
         parse(Args, ["--body.wheel.radius-m", "-1"])
@@ -196,7 +174,7 @@ def test_the_short_help_shows_what_is_usual_and_names_the_other_parts(capsys, mo
     [
         ("body", "--body.wheel.radius-m FLOAT", "--loud"),
         ("body", "--body.lights, --body.no-lights", "--size"),
-        ("others", "--folder, --dir PATH", "--size"),
+        ("others", "--folder PATH", "--size"),
         ("more", "--size INT INT", "--number"),
         ("all", "--body.wheel.width-m FLOAT", "usage"),
         ("width_m", "Of the tyre. (default: 0.05)", "--number"),

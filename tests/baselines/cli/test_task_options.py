@@ -155,7 +155,7 @@ def test_a_page_tells_the_words_without_folders(plans, tmp_path):
 def flags_of(command):
     """Return flag → the kind of its values, of a command's arguments."""
     args = importlib.import_module(command).Args
-    return {flag: option.kind for option in options_of(args, args()) for flag in (option.flag, *option.also)}
+    return {option.flag: option.kind for option in options_of(args, args())}
 
 
 TASK = {option.flag: option.kind for option in options_of(TaskOptions, TaskOptions())}
@@ -174,7 +174,7 @@ def test_every_command_takes_every_flag_of_a_task_with_the_same_values(command):
 
 def test_a_replay_takes_what_a_record_leaves_open():
     """A record holds its scenario: where the world's file lies now, and how much reading it may take."""
-    assert set(TASK) & set(flags_of("baselines.replay")) == {"--world", "--read-memory-mib"}
+    assert set(TASK) & set(flags_of("baselines.replay")) == {"--read-memory-mib"}
 
 
 @pytest.mark.parametrize(
