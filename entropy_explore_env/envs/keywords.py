@@ -9,6 +9,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypedDict
 
+from entropy_explore_env.envs.rewards import RewardFunction
 from entropy_explore_env.settings.action import Action
 from entropy_explore_env.settings.channel import Channel
 from entropy_explore_env.settings.ending import Ending
@@ -46,3 +47,11 @@ class ScenarioSettings(TypedDict, total=False):
     observation: Observation | Mapping[str, Any]
     max_cycles: int | None
     time_limit_s: float
+
+
+class EnvironmentSettings(ScenarioSettings, total=False):
+    """All keywords of environments of one mission: see `EntropyExploreEnv`."""
+
+    reward_function: RewardFunction | None
+    every_reset: Mapping[str, Any] | None
+    text_infos: bool

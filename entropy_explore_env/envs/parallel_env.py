@@ -34,7 +34,7 @@ from entropy_explore_env.worlds.given import with_given_worlds
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-    from entropy_explore_env.envs.keywords import ScenarioSettings
+    from entropy_explore_env.envs.keywords import EnvironmentSettings, ScenarioSettings
 
 _SENT_BY_CHECKERS = {"options": 1}
 """What `parallel_api_test` and `api_test` of PettingZoo reset with."""
@@ -266,34 +266,21 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
 def parallel_env(
     scenario: str | Scenario = "room",
     render_mode: str | None = None,
-    *,
-    reward_function: RewardFunction | None = None,
-    every_reset: Mapping[str, Any] | None = None,
-    text_infos: bool = True,
-    **settings: Unpack[ScenarioSettings],
+    **settings: Unpack[EnvironmentSettings],
 ) -> EntropyExploreEnv:
     """Return a team's mission as a ParallelEnv: see `EntropyExploreEnv`.
 
     Args:
         scenario: A scenario's name (`entropy_explore_env.SCENARIOS`), or a Scenario.
         render_mode: None, `rgb_array` or `human`.
-        reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
-        every_reset: `starts` and `world` of all missions, for resets that do not say them.
-        text_infos: Whether infos hold texts; see `EntropyExploreEnv`.
-        **settings: Fields of the Scenario to change: `robots`, `world` (a recipe, a file, a World, or
+        **settings: `reward_function`, `every_reset` and `text_infos`, see `EntropyExploreEnv`; and fields of
+            the Scenario to change: `robots`, `world` (a recipe, a file, a World, or
             several Worlds dealt to missions in turn: see `worlds.given`),
             `decision_period_s`, `max_cycles`, `time_limit_s`, and its parts `grid`, `robot`, `sensor`,
             `channel` (`{"burst": 32, "i_min_bits": 0.3}`), `ending`, `reward`, `action`, `observation`,
             each a mapping of some of its fields or a whole object: see `help` of Scenario, Channel, …
     """
-    return EntropyExploreEnv(
-        scenario,
-        render_mode,
-        reward_function=reward_function,
-        every_reset=every_reset,
-        text_infos=text_infos,
-        **settings,
-    )
+    return EntropyExploreEnv(scenario, render_mode, **settings)
 
 
 # Dedented first: beside text at the margin indented text stays indented, and its sections are no sections.
@@ -357,20 +344,7 @@ class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):
 def env(
     scenario: str | Scenario = "room",
     render_mode: str | None = None,
-    *,
-    reward_function: RewardFunction | None = None,
-    every_reset: Mapping[str, Any] | None = None,
-    text_infos: bool = True,
-    **settings: Unpack[ScenarioSettings],
+    **settings: Unpack[EnvironmentSettings],
 ) -> TurnTakingEnv:
     """Return the same as an AECEnv: robots act in turn, and the step is taken when all have."""
-    return TurnTakingEnv(
-        parallel_env(
-            scenario,
-            render_mode,
-            reward_function=reward_function,
-            every_reset=every_reset,
-            text_infos=text_infos,
-            **settings,
-        )
-    )
+    return TurnTakingEnv(parallel_env(scenario, render_mode, **settings))
