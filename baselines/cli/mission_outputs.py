@@ -156,7 +156,7 @@ class MissionLog:
         if not self._films:
             return
         self._painter.watch(env.missions)
-        time_s = self.recorder.latest_s
+        time_s = float(env.missions.state.missions[0]["time_s"])
         films = [film for film in self._films.values() if film.due(time_s) or not env.agents]
         picture = self._painter.picture(env.missions) if films else None
         for film in films:
@@ -210,9 +210,9 @@ class MissionLog:
 
     def _results(self) -> dict[str, np.ndarray]:
         """Return the arrays that a record keeps for readers: poses over time, and the team's map."""
-        recorder = self.recorder
-        arrays = [recorder.time_s, recorder.poses]
-        if recorder.missions.grid.voxels <= MOST_MAP_VOXELS:
+        series = self.recorder.series()
+        arrays = [series.time_s, series.poses]
+        if self.recorder.missions.grid.voxels <= MOST_MAP_VOXELS:
             arrays += [self._team_map.mean, self._team_map.precision]
         return dict(zip(RESULTS, arrays, strict=False))
 
@@ -220,15 +220,15 @@ class MissionLog:
         """Write figures with their series, the picture of curves and maps, and the map; return the files."""
         from baselines.cli.mission_picture import mission_picture
 
-        recorder = self.recorder
-        rows = recorder.sampled_moments(_SERIES_POINTS)
-        series = {
-            "time_s": recorder.time_s[rows].tolist(),
-            "entropy_bits": recorder.entropy_bits[rows].tolist(),
-            "scans": recorder.scans[rows].tolist(),
-            "shared_measurements": recorder.shared[rows].tolist(),
+        recorder, series = self.recorder, self.recorder.series()
+        rows = series.sampled(_SERIES_POINTS)
+        told = {
+            "time_s": series.time_s[rows].tolist(),
+            "entropy_bits": series.entropy_bits[rows].tolist(),
+            "scans": series.scans.sum(axis=1)[rows].tolist(),
+            "shared_measurements": series.shared[rows].tolist(),
         }
-        content = {**figures, "settings": settings_of(recorder.missions.scenario), "series": series}
+        content = {**figures, "settings": settings_of(recorder.missions.scenario), "series": told}
         write_atomically(folder / "mission.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
         strategy = shown_name(figures["strategy"])
         end = self._painter.frame(recorder.missions)

@@ -40,7 +40,7 @@ def mission_picture(recorder: Recorder, end: Frame, title: str, strategy: str, t
         left, right = figure.subplots(1, 2)
         _draw_entropies(left, recorder)
         sent, label, of_what = _sent(recorder)
-        right.step(recorder.time_s, sent, where="post", color="0.2")
+        right.step(recorder.series().time_s, sent, where="post", color="0.2")
         right.set(xlabel="simulated time (s)", ylabel=label, title=f"{of_what}, cumulative")
         what = f"{title}, {strategy}, {counted(missions.scenario.robots, 'robot')}, seed {missions.seeds[0]}"
         figure.suptitle(what, x=0.01, ha="left", fontsize=11)
@@ -67,21 +67,21 @@ def true_world(frame: Frame, recorder: Recorder) -> Frame:
 
 def _sent(recorder: Recorder) -> tuple[np.ndarray, str, str]:
     """(T,) what the team has sent, the axis' label and what it is; scans of a robot that is alone."""
-    scenario = recorder.missions.scenario
+    scenario, series = recorder.missions.scenario, recorder.series()
     if scenario.robots == 1:
-        return recorder.scans, "scans", "Scans"
+        return series.scans[:, 0], "scans", "Scans"
     if scenario.channel.content == "summaries":
-        return recorder.bits_sent / 1000, "sent by the team (kbit)", "Summaries"
-    return recorder.shared, "measurements sent by the team", "Shared measurements"
+        return series.bits_sent / 1000, "sent by the team (kbit)", "Summaries"
+    return series.shared, "measurements sent by the team", "Shared measurements"
 
 
 def _draw_entropies(axes: Axes, recorder: Recorder) -> None:
     """Draw the entropy of each robot's map over time, and the threshold that ends the mission."""
-    robots = recorder.missions.scenario.robots
+    robots, series = recorder.missions.scenario.robots, recorder.series()
     for robot in range(robots):
         axes.step(
-            recorder.time_s,
-            recorder.entropy_bits[:, robot] / 1000,
+            series.time_s,
+            series.entropy_bits[:, robot] / 1000,
             where="post",
             color=COLOURS[robot % len(COLOURS)],
             linewidth=1.0 + 0.8 * (robots - 1 - robot),  # equal maps: all of the curves can be seen

@@ -199,20 +199,21 @@ def record_mission(
 
     run_mission(env, strategy, seed, note)
     figures = mission_figures(env.missions, 0)
-    best = recorder.entropy_bits.min(axis=1)
+    series = recorder.series()
+    best = series.entropy_bits.min(axis=1)
     middle = 0.5 * (figures["entropy_start_bits"] + figures["entropy_threshold_bits"])
     halved = np.flatnonzero(best <= middle)
-    rows = recorder.sampled_moments(_SERIES_POINTS)
-    single = np.flatnonzero(np.diff(recorder.scans) == 1)
+    rows = series.sampled(_SERIES_POINTS)
+    single = np.flatnonzero(np.diff(series.scans.sum(axis=1)) == 1)
     return {
         **figures,
-        "half_s": float(recorder.time_s[halved[0]]) if len(halved) else None,
-        "sent_by_scan": np.diff(recorder.shared)[single].tolist(),
-        "apart_m": round(_mean_distance_apart_m(recorder.scan_positions_m[1:]), 3),
+        "half_s": float(series.time_s[halved[0]]) if len(halved) else None,
+        "sent_by_scan": np.diff(series.shared)[single].tolist(),
+        "apart_m": round(_mean_distance_apart_m(series.scan_positions_m[1:]), 3),
         "series": {
-            "time_s": np.round(recorder.time_s[rows], 3).tolist(),
+            "time_s": np.round(series.time_s[rows], 3).tolist(),
             "entropy_bits": np.round(best[rows], 1).tolist(),
-            "shared_measurements": recorder.shared[rows].tolist(),
+            "shared_measurements": series.shared[rows].tolist(),
         },
     }
 

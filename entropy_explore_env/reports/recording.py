@@ -1,4 +1,4 @@
-"""Time series of a mission, recorded step by step: entropies, scans, poses and driven paths."""
+"""Time series of a mission, recorded step by step, and the paths that its robots drive."""
 
 from __future__ import annotations
 
@@ -78,22 +78,27 @@ class DrivenPaths:
         return [np.stack([*points, place]) for points, place in zip(self.passed_m, here, strict=True)]
 
 
-class Moment(NamedTuple):
-    """What is recorded of a mission at one moment."""
+class Series(NamedTuple):
+    """What is recorded of a mission at T moments."""
 
-    time_s: float
+    time_s: np.ndarray
+    """(T,) float64."""
     entropy_bits: np.ndarray
-    """(A,) float64 entropy of each robot's map."""
+    """(T, A) float64 entropy of each robot's map."""
     scans: np.ndarray
-    """(A,) int64 scans of each robot since the reset."""
-    shared: int
-    """Measurements that the team has sent since the reset."""
-    bits_sent: int
-    """Bits that the team has sent since the reset."""
+    """(T, A) int64 scans of each robot since the reset."""
+    shared: np.ndarray
+    """(T,) int64 measurements that the team has sent since the reset."""
+    bits_sent: np.ndarray
+    """(T,) int64 bits that the team has sent since the reset."""
     scan_positions_m: np.ndarray
-    """(A, 3) float64 where each robot took its latest scan."""
+    """(T, A, 3) float64 where each robot took its latest scan."""
     poses: np.ndarray
-    """(A, 5) float64 of each robot: x, y, z, yaw, pitch."""
+    """(T, A, 5) float64 of each robot: x, y, z, yaw, pitch."""
+
+    def sampled(self, most: int) -> np.ndarray:
+        """Return (≤ most,) int64 numbers of evenly spaced moments, the first and the last among them."""
+        return np.unique(np.linspace(0, len(self.time_s) - 1, most).round().astype(np.int64))
 
 
 class Recorder:
@@ -106,74 +111,22 @@ class Recorder:
     def __init__(self, missions: Missions) -> None:
         """Follow these missions; nothing is recorded yet."""
         self.missions = missions
-        self._moments: list[Moment] = []
-        self._paths = DrivenPaths(missions.scenario.robots)
+        self._moments: list[Series] = []
 
     def note(self) -> None:
         """Record this moment, after a reset or a step."""
         robots = self.missions.state.robots[0]
-        moment = Moment(
-            time_s=float(self.missions.state.missions[0]["time_s"]),
+        moment = Series(
+            time_s=self.missions.state.missions[0]["time_s"].copy(),
             entropy_bits=robots["entropy_bits"].copy(),
             scans=robots["scans"].copy(),
-            shared=int(robots["measurements_sent"].sum()),
-            bits_sent=int(robots["bits_sent"].sum()),
+            shared=robots["measurements_sent"].sum(),
+            bits_sent=robots["bits_sent"].sum(),
             scan_positions_m=robots["scan_pose"][:, :3].copy(),
             poses=poses_now(self.missions, 0),
         )
         self._moments.append(moment)
-        self._paths.update(self.missions)
 
-    def sampled_moments(self, most: int) -> np.ndarray:
-        """Return (≤ most,) int64 numbers of evenly spaced moments, the first and the last among them."""
-        return np.unique(np.linspace(0, len(self._moments) - 1, most).round().astype(np.int64))
-
-    @property
-    def latest_s(self) -> float:
-        """Time of the latest moment."""
-        return self._moments[-1].time_s
-
-    @property
-    def time_s(self) -> np.ndarray:
-        """(T,) float64 times of the moments."""
-        return np.array([moment.time_s for moment in self._moments])
-
-    @property
-    def entropy_bits(self) -> np.ndarray:
-        """(T, A) float64 entropy of each robot's map."""
-        return np.stack([moment.entropy_bits for moment in self._moments])
-
-    @property
-    def scans(self) -> np.ndarray:
-        """(T,) int64 scans of the team since the reset."""
-        return self.robot_scans.sum(axis=1)
-
-    @property
-    def robot_scans(self) -> np.ndarray:
-        """(T, A) int64 scans of each robot since the reset."""
-        return np.stack([moment.scans for moment in self._moments])
-
-    @property
-    def shared(self) -> np.ndarray:
-        """(T,) int64 measurements that the team has sent since the reset."""
-        return np.array([moment.shared for moment in self._moments])
-
-    @property
-    def bits_sent(self) -> np.ndarray:
-        """(T,) int64 bits that the team has sent since the reset."""
-        return np.array([moment.bits_sent for moment in self._moments])
-
-    @property
-    def scan_positions_m(self) -> np.ndarray:
-        """(T, A, 3) float64 where each robot took its latest scan."""
-        return np.stack([moment.scan_positions_m for moment in self._moments])
-
-    @property
-    def paths_m(self) -> list[np.ndarray]:
-        """For each robot (N, 3) float64: the path that it has driven, corner by corner."""
-        return self._paths.to_now(self.missions)
-
-    @property
-    def poses(self) -> np.ndarray:
-        """(T, A, 5) float64 pose of each robot: x, y, z, yaw, pitch."""
-        return np.stack([moment.poses for moment in self._moments])
+    def series(self) -> Series:
+        """Return what was recorded so far."""
+        return Series(*(np.array(moments) for moments in zip(*self._moments, strict=True)))

@@ -21,7 +21,7 @@ from tests.reference.scenes import free_box, random_actions, started
 
 
 def recorded(path, steps: int = 40, scenario=None):
-    """A mission of random actions, written to a file; and its recorder."""
+    """A mission of random actions, written to a file; its series, and what was left of its entropy."""
     missions = started(scenario or free_box(robots=2, grid=free_box().grid), seed=4)
     recorder, rng, left = Recorder(missions), np.random.default_rng(0), []
     with RerunView(missions, path) as view:
@@ -32,7 +32,7 @@ def recorded(path, steps: int = 40, scenario=None):
             left.append(remaining_share(missions, 0))
             view.note()
         view.finish()
-    return recorder, np.stack(left)
+    return missions, recorder.series(), np.stack(left)
 
 
 class Recording:
@@ -67,12 +67,11 @@ class Recording:
 def box(tmp_path_factory):
     pytest.importorskip("rerun")
     path = tmp_path_factory.mktemp("rerun") / "box.rrd"
-    recorder, left = recorded(path)
-    return recorder, left, Recording(path)
+    return *recorded(path), Recording(path)
 
 
 def test_entities_and_the_one_timeline(box):
-    recorder, _, recording = box
+    _missions, series, _, recording = box
     assert recording.timelines == {"simulated"}
     wanted = {"/world", "/world/workspace", "/shared_measurements"}
     for robot in ("robot_0", "robot_1"):
@@ -81,18 +80,18 @@ def test_entities_and_the_one_timeline(box):
     wanted |= {f"/world/{kind}/0_{y}_0" for kind in ("entropy", "coverage") for y in (0, 1)}
     assert wanted == set(recording.rows)
     times = [row[0] for rows in recording.rows.values() for row in rows if row[0] is not None]
-    assert min(times) == 0.0 and max(times) == pytest.approx(recorder.latest_s, abs=1e-8)
+    assert min(times) == 0.0 and max(times) == pytest.approx(series.time_s[-1], abs=1e-8)
 
 
 @pytest.mark.parametrize("robot", [0, 1])
 def test_poses_are_the_recorder_s(robot, box):
-    recorder, left, recording = box
+    _, series, left, recording = box
     entity = f"/world/robots/robot_{robot}"
     times, places = recording.series(entity, "Transform3D:translation")
-    np.testing.assert_allclose(times, recorder.time_s, atol=1e-8)
-    np.testing.assert_array_equal(places.astype(np.float32), recorder.poses[:, robot, :3].astype(np.float32))
+    np.testing.assert_allclose(times, series.time_s, atol=1e-8)
+    np.testing.assert_array_equal(places.astype(np.float32), series.poses[:, robot, :3].astype(np.float32))
     _, turned = recording.series(entity, "Transform3D:quaternion")
-    yaw, pitch = recorder.poses[:, robot, 3:].T
+    yaw, pitch = series.poses[:, robot, 3:].T
     gaze = np.stack([np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), -np.sin(pitch)], axis=-1)
     x, y, z, w = turned.T  # the first column of the rotation: where the robot's x axis points
     ahead = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)], axis=-1)
@@ -102,9 +101,9 @@ def test_poses_are_the_recorder_s(robot, box):
 
 
 def test_paths_lead_through_every_place(box):
-    recorder, _, recording = box
+    _missions, series, _, recording = box
     (path,) = recording.rows["/world/paths/robot_1/0000"][-1][1]["LineStrips3D:strips"]
-    places = recorder.poses[:, 1, :3]
+    places = series.poses[:, 1, :3]
     moved = np.concatenate([[True], (np.diff(places, axis=0) != 0).any(axis=1)])
     np.testing.assert_array_equal(np.float32(path), places[moved].astype(np.float32))
 
@@ -112,19 +111,18 @@ def test_paths_lead_through_every_place(box):
 def test_long_paths_come_in_parts_that_hang_together(tmp_path, monkeypatch):
     pytest.importorskip("rerun")
     monkeypatch.setattr(rerun_view, "_PART", 7)
-    recorder, _ = recorded(tmp_path / "m.rrd")
+    _missions, series, _ = recorded(tmp_path / "m.rrd")
     recording = Recording(tmp_path / "m.rrd")
     parts = sorted(entity for entity in recording.rows if entity.startswith("/world/paths/robot_0/"))
     strips = [recording.rows[part][-1][1]["LineStrips3D:strips"][0] for part in parts]
     assert len(parts) > 3 and all(len(strip) == 8 for strip in strips[:-1])
     for before, after in pairwise(strips):
         assert before[-1] == after[0]
-    assert strips[-1][-1] == recorder.poses[-1, 0, :3].astype(np.float32).tolist()
+    assert strips[-1][-1] == series.poses[-1, 0, :3].astype(np.float32).tolist()
 
 
 def test_in_the_end_the_voxels_are_those_of_the_belief(box):
-    recorder, _, recording = box
-    missions = recorder.missions
+    missions, _series, _, recording = box
     grid, share, mean = missions.grid, entropy_share(missions, 0, 0), missions.mean[0, 0]
     for kind, component, wanted in (
         ("entropy", "Points3D:positions", share < 0.9),
@@ -141,17 +139,17 @@ def test_in_the_end_the_voxels_are_those_of_the_belief(box):
 
 
 def test_shared_rays_begin_at_the_scan_and_end_where_something_was_measured(box):
-    recorder, _, recording = box
+    missions, _series, _, recording = box
     rows = recording.rows["/world/shared/robot_0"]
     batches = [row[1]["LineStrips3D:strips"] for row in rows]
     assert {len(batch) for batch in batches} <= set(range(9)) and any(batches)
-    low = np.asarray(recorder.missions.grid.origin_m) - 1e-3
-    high = low + recorder.missions.grid.size_m + 2e-3
+    low = np.asarray(missions.grid.origin_m) - 1e-3
+    high = low + missions.grid.size_m + 2e-3
     for batch in batches:
         assert len({tuple(ray[0]) for ray in batch}) <= 1
         for ray in batch:
             assert (np.array(ray[1]) >= low).all() and (np.array(ray[1]) <= high).all()
-    sent = recorder.missions.state.robots[0, 0]["measurements_sent"]
+    sent = missions.state.robots[0, 0]["measurements_sent"]
     assert sum(map(len, batches)) == sent > 0
 
 
@@ -195,8 +193,8 @@ def test_cones_by_hand():
 def test_large_worlds_are_shown_by_larger_cells(tmp_path, monkeypatch):
     pytest.importorskip("rerun")
     monkeypatch.setattr(rerun_view, "MAX_CELLS", 60)
-    recorder, _ = recorded(tmp_path / "m.rrd")
-    recording, missions = Recording(tmp_path / "m.rrd"), recorder.missions
+    missions, _series, _ = recorded(tmp_path / "m.rrd")
+    recording = Recording(tmp_path / "m.rrd")
     (block,) = (rows for entity, rows in recording.rows.items() if entity.startswith("/world/entropy/"))
     places = {tuple(place) for place in block[-1][1]["Points3D:positions"]}
     share, expected = entropy_share(missions, 0, 0), set()

@@ -65,7 +65,7 @@ def test_curves_are_of_entropy_and_of_what_a_team_sends(monkeypatch, robots, con
     mission_picture(recorder, end, "box", "random")
     entropies, sent = figures[0].axes
     drawn = np.stack([line.get_ydata() for line in entropies.lines[:robots]], axis=1)
-    np.testing.assert_allclose(1000 * drawn, recorder.entropy_bits)
+    np.testing.assert_allclose(1000 * drawn, recorder.series().entropy_bits)
     state = recorder.missions.state.robots[0]
     found = {"measurements": state["measurements_sent"], "kbit": state["bits_sent"] / 1000}
     assert label in sent.get_ylabel()
