@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from entropy_explore_env import SCENARIOS, EntropyExploreEnv, SettingError
+from entropy_explore_env import SCENARIOS, SettingError
 from entropy_explore_env.command import BAD_INPUT, run_command
 from entropy_explore_env.envs import conformance
 from entropy_explore_env.envs.conformance import (
@@ -22,118 +22,72 @@ from entropy_explore_env.envs.conformance import (
 )
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.worlds.world import World
 from tests.envs.pairwise import pairwise
+from tests.missions.kinds import KINDS
 from tests.reference.scenes import SMALL
 
 BOX = SCENARIOS["box-7x11x5"]
 PARTS = {"patch": True, "overview": True, "action_mask": True}
-KINDS = ("continuous", "discrete")
 
 
-def conform(scenario: str, robots: int, kind: str) -> int:
-    """Check a team that observes everything; how many checks held."""
+OWN: dict[str, dict[str, Any]] = {
+    "flat observations, until time is up": {
+        "decision_period_s": None,
+        "ending": {"time_limit_s": 25.0},
+        "observation": {"flat": True},
+    },
+    "until a map is known": {"decision_period_s": None, "ending": {"sigma_end": 25.0}},
+    "until much is seen": {"ending": {"seen_share": 0.6, "time_limit_s": 60.0}},
+    "a crowd": {
+        "robots": 9,
+        "robot": {"body_radius_m": 0.24},
+        "reward": {"kind": "team", "cost_per_s": 0.001},
+        "ending": {"max_cycles": 20},
+    },
+    "far goals in a plane": {
+        "robot": {"motion": "planar", "reach_m": float("inf")},
+        "channel": {"range_m": 1.5},
+        "ending": {"max_cycles": 20},
+    },
+    "a plan": {
+        "grid": Grid((9, 6, 1), 0.5),
+        "world": "furnished",
+        "ending": {"sigma_end": 3.0, "termination": "all", "max_cycles": 20},
+    },
+}
+
+
+@pytest.mark.parametrize("settings", OWN.values(), ids=OWN)
+def test_scenarios_of_one_s_own_conform(in_this_process: int, settings: dict[str, Any]) -> None:
     said: list[str] = []
-    check_conformance(
-        scenario,
-        robots=robots,
-        steps=25,
-        seed=robots,
-        action={"kind": kind},
-        observation=PARTS,
-        report=said.append,
-    )
-    return len(said)
+    check_conformance(with_settings(BOX, settings), steps=None, seed=3, report=said.append)
+    assert len(said) == in_this_process
 
 
-@pytest.mark.parametrize(("scenario", "robots", "kind"), pairwise(SMALL, (1, 2, 5), KINDS))
+@pytest.mark.parametrize(("scenario", "robots", "kind"), pairwise(SMALL, (1, 3), ("continuous", "discrete")))
 def test_scenarios_conform(in_this_process: int, scenario: str, robots: int, kind: str) -> None:
-    assert conform(scenario, robots, kind) == in_this_process == 8
-
-
-@pytest.mark.parametrize("period_s", [None, 1.0])
-def test_a_team_with_faults_conforms(in_this_process: int, period_s: float | None) -> None:
-    faults = {
-        "stop": {"mean_s": 12.0, "lasts_s": 3.0},
-        "blind": {"mean_s": 10.0, "lasts_s": 5.0},
-        "silent": {"mean_s": 10.0, "lasts_s": 5.0},
-        "sensor": {"lost_rays": 0.2, "range_factor": 1.05},
-        "radio": {"garbled": 0.2, "repeated": 0.2, "late": 0.2},
-    }
-    channel = {"reach": "signal", "i_min_bits": 0.0}
-    settings = {"faults": faults, "channel": channel, "decision_period_s": period_s}
     said: list[str] = []
-    check_conformance(BOX, robots=3, steps=25, report=said.append, **settings)
-    assert len(said) == in_this_process
+    settings = {"robots": robots, "action": {"kind": kind}, "observation": PARTS}
+    check_conformance(scenario, steps=20, seed=robots, report=said.append, **settings)
+    assert len(said) == in_this_process == 8
 
 
-@pytest.mark.parametrize("period_s", [None, 1.0])
-def test_a_team_that_drifts_conforms(in_this_process: int, period_s: float | None) -> None:
-    drift = {"xy_m_per_sqrt_m": 0.05, "z_m_per_sqrt_m": 0.01, "yaw_rad_per_sqrt_m": 0.02}
-    settings = {
-        "robot": {"localization": drift, "redecide": "on_scan"},
-        "sensor": {"scan_every_m": 0.4},
-        "fiducials": {"number": 4},
-        "channel": {"i_min_bits": 0.0, "delay_s": 0.3},
-        "decision_period_s": period_s,
-    }
-    said: list[str] = []
-    check_conformance(BOX, robots=3, steps=25, report=said.append, **settings)
-    assert len(said) == in_this_process
-
-
-@pytest.mark.parametrize("period_s", [None, 1.0])
-def test_a_team_that_sends_summaries_conforms(in_this_process: int, period_s: float | None) -> None:
-    settings = {
-        "channel": {"content": "summaries", "summary_every_s": 1.0, "delay_s": 0.3, "loss_probability": 0.2},
-        "observation": {"overview": True},
-        "decision_period_s": period_s,
-    }
-    said: list[str] = []
-    check_conformance(BOX, robots=3, steps=25, report=said.append, **settings)
-    assert len(said) == in_this_process
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("robots", range(1, 6))
-@pytest.mark.parametrize("scenario", SMALL)
-def test_scenarios_conform_in_fresh_processes_too(scenario: str, robots: int, kind: str) -> None:
-    assert conform(scenario, robots, kind) == len(conformance.CHECKS) == 9
+def test_missions_of_every_kind_conform(in_this_process: int, kind: str) -> None:
+    scenario, _, given = KINDS[kind]
+    said: list[str] = []
+    check_conformance(scenario, steps=12, report=said.append, **({"world": list(given)} if given else {}))
+    assert len(said) == in_this_process
 
 
-@pytest.mark.parametrize(
-    "settings",
-    [
-        {"decision_period_s": None, "time_limit_s": 25.0, "observation": {"flat": True}},
-        {"decision_period_s": None, "time_limit_s": 25.0, "robot": {"redecide": 0.7}},
-        {"ending": {"seen_share": 0.6, "time_limit_s": 60.0}, "time_limit_s": 60.0},
-        {"robot": {"redecide": "on_scan", "navigator": "planned"}, "sensor": {"scan_every_m": 0.3}},
-        {"robots": 9, "robot": {"body_radius_m": 0.24}, "reward": {"kind": "team", "cost_per_s": 0.001}},
-        {"robot": {"motion": "planar", "reach_m": float("inf")}, "channel": {"range_m": 1.5}},
-        {
-            "grid": Grid((9, 6, 1), 0.5),
-            "world": "furnished",
-            "ending": {"sigma_end": 3.0, "termination": "all"},
-        },
-    ],
-)
-@pytest.mark.usefixtures("in_this_process")
-def test_scenarios_of_one_s_own_conform(settings: dict[str, Any]) -> None:
-    check_conformance(with_settings(BOX, settings), steps=None if "time_limit_s" in settings else 25, seed=3)
-
-
-def test_a_scenario_full_of_chance_conforms() -> None:
+def test_chance_in_given_worlds_conforms_in_fresh_processes_too() -> None:
+    said: list[str] = []
+    worlds = [World(BOX.grid, np.arange(385).reshape(7, 11, 5) % 13 == number, "dots") for number in (0, 1)]
     channel = {"loss_probability": 0.3, "delay_s": 2.0, "i_min_bits": 0.0}
-    check_conformance(BOX, steps=25, robots=3, channel=channel, sensor={"range_noise_m": 0.1})
-
-
-@pytest.mark.parametrize("redecide", ["at_stop", pytest.param(0.7, marks=pytest.mark.long)])
-@pytest.mark.usefixtures("in_this_process")
-def test_candidates_as_actions_conform(redecide: str | float) -> None:
-    observation = {"action_mask": True, "overlaps": True, "drive": True}
-    robot = {"redecide": redecide, "navigator": "planned"}
-    action = {"kind": "candidates", "candidates": 10}
-    check_conformance(BOX, steps=8, robots=3, action=action, observation=observation, robot=robot)
+    settings = {"channel": channel, "sensor": {"range_noise_m": 0.1}, "world": worlds}
+    check_conformance(BOX, steps=8, robots=3, report=said.append, **settings)
+    assert len(said) == len(conformance.CHECKS) == 9
 
 
 def test_bad_settings_are_refused() -> None:
@@ -224,16 +178,3 @@ def test_the_command_s_results_as_one_object(
     assert conformance.main(["box-7x11x5", "--steps", "3", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["broken"] is None and len(said["held"]) == in_this_process
-
-
-@pytest.mark.usefixtures("in_this_process")
-def test_a_mission_that_reaches_its_threshold_conforms() -> None:
-    quick = with_settings(BOX, {"decision_period_s": None, "ending": {"sigma_end": 25.0}})
-    env = EntropyExploreEnv(quick)
-    env.reset(seed=0)
-    steps = 0
-    while env.agents:
-        infos = env.step({agent: env.action_space(agent).sample() for agent in env.agents})[4]
-        steps += 1
-    assert infos["robot_0"]["end"] == "MAPPED" and steps < 200
-    check_conformance(quick, steps=None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 from types import SimpleNamespace
 from typing import Any
 
@@ -34,7 +33,7 @@ PARTS: dict[str, dict[str, Any]] = {
     "flat": {"drive": True, "patch": True, "overview": True, "action_mask": True, "flat": True},
 }
 KINDS = ("continuous", "discrete")
-TEAMS = (SMALL, range(1, 6), KINDS)
+TEAMS = (SMALL, (1, 2, 5), KINDS)
 SINGLES = (SMALL, KINDS, [parts for parts in PARTS if parts != "nothing"])
 """Without `nothing`: Gymnasium does not allow an empty observation space."""
 
@@ -89,7 +88,7 @@ def test_pettingzoo_max_cycles_of_the_package() -> None:
     max_cycles_test(entropy_explore_env)
 
 
-@pytest.mark.parametrize(("scenario", "robots"), list(zip(itertools.cycle(SMALL), range(1, 6), strict=False)))
+@pytest.mark.parametrize(("scenario", "robots"), list(zip(SMALL, (1, 2, 5), strict=True)))
 def test_pettingzoo_rendering(scenario: str, robots: int) -> None:
     shapes = []
 

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import copy
-import pickle
-
 import gymnasium
 import numpy as np
 import pettingzoo
 import pytest
 
 import entropy_explore_env as eee
-from entropy_explore_env.envs.conformance import check_conformance
-from entropy_explore_env.envs.episodes import require_same, snapshot
 
 ROOM = "entropy_explore_env/Room-v1"
 SHAPE = (9, 12, 7)
@@ -67,38 +62,6 @@ def test_worlds_are_dealt_to_missions_and_to_episodes():
     assert team.missions.worlds[0] is HUT
     team.reset()
     assert team.missions.worlds[0] is OTHER
-
-
-def test_the_mission_of_a_seed_is_the_same_in_a_batch_and_alone():
-    vector = eee.EntropyExploreVectorEnv("room", 3, world=[HUT, OTHER], robots=2)
-    vector.reset(seed=4)
-    team = eee.parallel_env("room", world=[HUT, OTHER], robots=2, decision_period_s=1.0)
-    for mission in range(3):
-        team.reset(seed=4 + mission)
-        assert team.missions.state.robots[0].tobytes() == vector.missions.state.robots[mission].tobytes()
-        assert team.missions.state.truth[0].tobytes() == vector.missions.state.truth[mission].tobytes()
-
-
-@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
-def test_copies_go_on_in_their_worlds(copied):
-    env = eee.parallel_env("room", world=[HUT, OTHER], robots=2)
-    env.reset(seed=3)
-    other = copied(env)
-    for _ in range(2):
-        while env.agents:
-            actions = {agent: np.full(5, 0.4, np.float32) for agent in env.agents}
-            env.step(actions)
-            other.step(actions)
-            if env.missions.state.missions[0]["time_s"] > 20:
-                break
-        require_same("original, then copy", snapshot(env), snapshot(other))
-        env.reset()
-        other.reset()
-    assert other.missions.worlds[0].name == env.missions.worlds[0].name == "hut 6"
-
-
-def test_a_scenario_in_given_worlds_keeps_the_contract():
-    check_conformance("box-7x11x5", world=[HUT, OTHER], robots=2, steps=8)
 
 
 @pytest.mark.parametrize("scenario", ["room", "office", "terrain"])

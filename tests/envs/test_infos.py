@@ -17,12 +17,11 @@ from entropy_explore_env import (
     parallel_env,
 )
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.settings.grid import Grid
+from tests.envs.pairwise import pairwise
 from tests.reference.scenes import SMALL
 
 BOX = "box-7x11x5"
 DISCRETE = {"kind": "discrete", "yaws": 5, "pitches": 3}
-FLAT_GRID = Grid((9, 6, 1), 0.5, (-1.0, 2.0, 0.0))
 
 
 def sensible_moves(view: RobotView) -> list[bool]:
@@ -52,9 +51,7 @@ def sampled(
     return {agent: int(rng.choice(those)) for agent, those in choices.items()}
 
 
-@pytest.mark.parametrize("flat", [False, True])
-@pytest.mark.parametrize("robots", [1, 3])
-@pytest.mark.parametrize("scenario", SMALL)
+@pytest.mark.parametrize(("scenario", "robots", "flat"), pairwise(SMALL, (1, 3), (False, True)))
 def test_masks_of_infos_and_observations_are_what_the_definition_says(
     scenario: str, robots: int, flat: bool
 ) -> None:
@@ -74,60 +71,6 @@ def test_masks_of_infos_and_observations_are_what_the_definition_says(
             busy += not info["deciding"]
             refused += int((mask == 0).sum())
     assert busy and refused
-
-
-@pytest.mark.parametrize(
-    "settings", [{}, {"grid": FLAT_GRID}, {"robot": {"motion": "planar", "reach_m": 1.0}}]
-)
-def test_masked_moves_arrive_in_an_empty_world_and_others_do_not(settings: dict[str, Any]) -> None:
-    """In a box without obstacles, a move that the mask allows ends in the middle of its voxel."""
-    settings = {
-        "action": DISCRETE,
-        "decision_period_s": None,
-        "max_cycles": 150,
-        "ending": {"sigma_end": 1e-3},
-        **settings,
-    }
-    env = parallel_env(BOX, robots=1, **settings)
-    rng = np.random.default_rng(2)
-    infos = env.reset(seed=3)[1]
-    ends = []
-    while env.agents:
-        view, action = env.view("robot_0"), sampled(env, rng, infos, masked=len(ends) % 2 == 0)["robot_0"]
-        allowed = infos["robot_0"]["action_mask"][action]
-        grid, gazes = view.scenario.grid, len(view.rules.actions.gazes)
-        voxel = grid.voxel_of(view.pose[:3]) + view.rules.actions.moves[action // gazes]
-        expected = np.array([*grid.centre_of(voxel), *view.rules.actions.gazes[action % gazes]])
-        if view.scenario.planar:
-            expected[2] = view.pose[2]
-        infos = env.step({"robot_0": action})[4]
-        ends.append(infos["robot_0"]["move_end"])
-        if allowed:
-            assert ends[-1] == "ARRIVED"
-            np.testing.assert_allclose(env.view("robot_0").pose, expected, atol=1e-9)
-        elif not ((voxel >= 0) & (voxel < grid.shape)).all():
-            assert ends[-1] == "WALL"
-    assert {"ARRIVED", "WALL"} <= set(ends)
-
-
-def test_masks_rule_out_what_is_believed_covered() -> None:
-    """In the furnished room, some moves into boxes that were seen are masked away."""
-    env = parallel_env("room-furnished", robots=1, action=DISCRETE, decision_period_s=None, max_cycles=150)
-    rng = np.random.default_rng(0)
-    infos = env.reset(seed=4)[1]
-    solid = masked = 0
-    while env.agents:
-        infos = env.step(sampled(env, rng, infos, masked=True))[4]
-        view, world = env.view("robot_0"), env.missions.worlds[0]
-        assert world is not None
-        for move, allowed in zip(
-            view.rules.actions.moves, infos["robot_0"]["action_mask"][::15], strict=True
-        ):
-            voxel = view.scenario.grid.voxel_of(view.pose[:3]) + move
-            if ((voxel >= 0) & (voxel < view.scenario.grid.shape)).all() and world.occupied[tuple(voxel)]:
-                solid += 1
-                masked += not allowed
-    assert solid > 20 and masked > solid / 2
 
 
 def test_continuous_actions_have_no_mask() -> None:

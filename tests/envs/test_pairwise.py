@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from tests.envs.pairwise import pairwise, params
+from tests.envs.pairwise import pairwise
 
 
 @pytest.mark.parametrize(
@@ -24,11 +24,3 @@ def test_every_pair_meets_in_few_cases(axes, most):
         met = {(case[first], case[second]) for case in cases}
         assert met == set(itertools.product(axes[first], axes[second]))
     assert len(cases) == len(set(cases)) <= most
-
-
-def test_what_pairs_do_not_need_is_long():
-    given = params("abc", (1, 2), "xy")
-    assert [case.values for case in given] == list(itertools.product("abc", (1, 2), "xy"))
-    assert [case.values for case in given if not case.marks] == sorted(pairwise("abc", (1, 2), "xy"))
-    assert {mark.name for case in given for mark in case.marks} == {"long"}
-    assert given[0].id == "a-1-x"

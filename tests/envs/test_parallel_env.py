@@ -17,7 +17,6 @@ from pettingzoo import AECEnv
 
 from entropy_explore_env import (
     SCENARIOS,
-    ActionError,
     CallOrderError,
     EntropyExploreEnv,
     SettingError,
@@ -94,19 +93,6 @@ def test_the_mission_ends_for_all_robots_together_when_a_map_is_known() -> None:
     assert team.agents == [] and len(team.possible_agents) == 3
 
 
-def test_all_maps_have_to_pass_the_threshold_where_the_scenario_says_so() -> None:
-    settings = {"robots": 3, "channel": {"burst": 0}}
-    one = played(parallel_env(BOX, ending={"sigma_end": 10.0}, **settings))
-    all_maps = played(parallel_env(BOX, ending={"sigma_end": 10.0, "termination": "all"}, **settings))
-    threshold = BOX_VOXELS * math.log2(math.sqrt(2 * math.pi * math.e) * 10.0)
-    passed = [
-        [info["entropy_bits"] <= threshold for info in results[-1][4].values()] for results in (one, all_maps)
-    ]
-    assert any(passed[0]) and not all(passed[0])
-    assert all(passed[1])
-    require_same("until one ends", leaves(one[:-1]), leaves(all_maps[: len(one) - 1]))
-
-
 @pytest.mark.parametrize(
     ("settings", "end", "steps"),
     [({"max_cycles": 7}, "CYCLES_UP", 7), ({"time_limit_s": 12.5}, "TIME_UP", 13)],
@@ -153,42 +139,6 @@ def test_rewards_are_bits_gained_as_shares_of_all_bits(kind: str) -> None:
     assert received > 0.0
 
 
-@pytest.mark.parametrize("period", [1.0, None])
-def test_team_rewards_add_up_to_the_mean_decrease_of_entropy(period: float | None) -> None:
-    team = parallel_env(
-        BOX,
-        robots=4,
-        reward={"kind": "team", "cost_per_s": 0.0},
-        decision_period_s=period,
-        ending={"sigma_end": 5.0},
-    )
-    start = [info["entropy_bits"] for info in team.reset(seed=3)[1].values()]
-    results = played(team, seed=3)
-    assert any(results[-1][2].values())
-    end = [info["entropy_bits"] for info in results[-1][4].values()]
-    total = sum(result[1]["robot_0"] for result in results)
-    span = BOX_VOXELS * math.log2(30.0 / 5.0)
-    assert total * span == pytest.approx(np.mean(start) - np.mean(end), rel=1e-7)
-    assert all(len(set(result[1].values())) == 1 for result in results)
-
-
-@pytest.mark.parametrize("kind", ["individual", "team"])
-def test_time_costs_what_the_scenario_says(kind: str) -> None:
-    free = parallel_env(
-        BOX, robots=2, reward={"kind": kind, "cost_per_s": 0.0}, decision_period_s=None, **QUICK
-    )
-    costly = parallel_env(
-        BOX, robots=2, reward={"kind": kind, "cost_per_s": 0.01}, decision_period_s=None, **QUICK
-    )
-    before_s = 0.0
-    for with_cost, without in zip(played(costly), played(free), strict=True):
-        time_s = with_cost[4]["robot_0"]["time_s"]
-        for agent in without[1]:
-            cost = without[1][agent] - with_cost[1][agent]
-            assert cost == pytest.approx(0.01 * (time_s - before_s), abs=1e-12)
-        before_s = time_s
-
-
 @pytest.mark.parametrize("flat", [False, True])
 @pytest.mark.parametrize("kind", ["continuous", "discrete"])
 def test_state_is_what_all_robots_observe(flat: bool, kind: str) -> None:
@@ -203,25 +153,6 @@ def test_state_is_what_all_robots_observe(flat: bool, kind: str) -> None:
     assert team.state_space is space and team.state() is not team.state()
 
 
-def test_view_is_the_robot_s_own() -> None:
-    team = parallel_env(BOX, robots=3, **QUICK)
-    results = played(team, seed=5)
-    views = {agent: team.view(agent) for agent in team.possible_agents}
-    for number, (agent, view) in enumerate(views.items()):
-        info = results[-1][4][agent]
-        assert (view.robot, view.time_s, view.deciding) == (number, info["time_s"], info["deciding"])
-        assert view.entropy_bits == info["entropy_bits"]
-        assert view.move_end.name == info["move_end"]
-        assert view.mean.shape == view.precision.shape == (7, 11, 5)
-        assert set(view.teammates) == {0, 1, 2} - {number}
-        own = results[-1][0][agent]["self"]
-        np.testing.assert_allclose(own[:3], 2 * view.pose[:3] / [3.5, 5.5, 2.5] - 1, atol=1e-6)
-        np.testing.assert_allclose(own[3:5], [np.cos(view.pose[3]), np.sin(view.pose[3])], atol=1e-6)
-        with pytest.raises(ValueError, match="read-only"):
-            view.mean[0, 0, 0] = 0.0
-    assert len({view.mean.tobytes() for view in views.values()}) == 3
-
-
 def test_view_wants_a_reset_and_a_robot_of_the_team() -> None:
     team = parallel_env(BOX)
     with pytest.raises(CallOrderError, match="before reset"):
@@ -230,48 +161,6 @@ def test_view_wants_a_reset_and_a_robot_of_the_team() -> None:
     for asked in (team.view, team.observation_space, team.action_space):
         with pytest.raises(SettingError, match="robot_0, robot_1"):
             asked("robot_2")
-
-
-@pytest.mark.parametrize("scenario", SMALL)
-def test_viewpoints_survive_being_written_as_actions(scenario: str) -> None:
-    """Continuous: up to rounding. Discrete: exactly, for centres of voxels and gazes of the set."""
-    rng = np.random.default_rng(0)
-    for kind in ("continuous", "discrete"):
-        team = parallel_env(scenario, robots=1, action={"kind": kind}, decision_period_s=None)
-        team.reset(seed=2)
-        for _ in range(60):
-            view = team.view("robot_0")
-            grid, reach = view.scenario.grid, view.scenario.robot.reach_m
-            aim = view.pose[:3] + rng.uniform(-1, 1, 3) * reach / math.sqrt(3)
-            gaze = [rng.uniform(-math.pi, math.pi), rng.uniform(-math.pi / 2, math.pi / 2)]
-            if kind == "discrete":
-                step = rng.integers(-1, 2, 3) * [1, 1, 0]
-                aim = grid.centre_of(grid.voxel_of(view.pose[:3]) + step)
-                gaze = [rng.integers(-7, 9) * math.pi / 8, rng.integers(-1, 2) * math.pi / 4]
-                if np.linalg.norm(aim - view.pose[:3]) > reach:
-                    continue
-            viewpoint = np.array([*aim, *gaze])
-            team.step({"robot_0": view.action_for(viewpoint)})
-            tolerance = 1e-12 if kind == "discrete" else 4e-7
-            np.testing.assert_allclose(team.view("robot_0").target, viewpoint, atol=tolerance)
-
-
-def test_a_place_beyond_reach_is_pulled_onto_it() -> None:
-    team = parallel_env("room", robots=1)
-    team.reset(seed=0)
-    view = team.view("robot_0")
-    away = np.array([5.0, 5.0, 2.0]) - view.pose[:3]
-    team.step({"robot_0": view.action_for(np.array([5.0, 5.0, 2.0, 0.0, 0.0]))})
-    expected = view.pose[:3] + 0.5 * away / np.linalg.norm(away)
-    np.testing.assert_allclose(team.view("robot_0").target[:3], expected, atol=1e-6)
-
-
-@pytest.mark.parametrize("viewpoint", [np.zeros(4), np.full(5, np.nan), np.array([0, 0, 0, np.inf, 0])])
-def test_a_viewpoint_that_is_none_is_refused(viewpoint: np.ndarray) -> None:
-    team = parallel_env(BOX)
-    team.reset(seed=0)
-    with pytest.raises(ActionError, match="viewpoint"):
-        team.view("robot_0").action_for(viewpoint)
 
 
 def test_reset_without_a_seed_goes_on_to_another_mission_that_the_seed_determines() -> None:
@@ -336,27 +225,6 @@ def test_an_environment_with_a_window_can_be_copied() -> None:
         require_same("pickle", snapshot(team), snapshot(pickled))
     finally:
         team.close()
-
-
-@pytest.mark.parametrize("kind", ["continuous", "discrete"])
-@pytest.mark.parametrize("scenario", SMALL)
-def test_robots_stand_in_free_voxels_of_the_workspace(scenario: str, kind: str) -> None:
-    """Whatever robots try, and where drives end at edges and corners of voxels, too."""
-    team = parallel_env(scenario, robots=2, action={"kind": kind}, decision_period_s=None, max_cycles=800)
-    rng = np.random.default_rng(0)
-    team.reset(seed=0)
-    world, stopped = team.missions.worlds[0], set()
-    assert world is not None
-    while team.agents:
-        infos = team.step(team_actions(team, rng))[4]
-        for agent, info in infos.items():
-            view = team.view(agent)
-            voxel = view.scenario.grid.voxel_of(view.pose[:3])
-            where = f"{agent} at {view.pose[:3]}, {info['move_end']}"
-            assert ((voxel >= 0) & (voxel < world.grid.shape)).all(), f"outside the workspace: {where}"
-            assert not world.occupied[tuple(voxel)], f"in something solid: {where}"
-            stopped.add(info["move_end"])
-    assert {"ARRIVED", "WALL"} <= stopped
 
 
 def test_help_shows_every_part_of_an_observation_with_its_shape() -> None:

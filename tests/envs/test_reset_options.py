@@ -215,7 +215,6 @@ def test_what_cannot_be_is_refused_by_name_and_changes_nothing(options: Any, sai
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        *((options, said) for options, said in REFUSED[3:20]),
         ({"reset_masks": None}, "did you mean reset_mask"),
         ({"starts": np.stack([STARTS] * 3)}, r"\(2, 5\) or \(2, 2, 5\)"),
         ({"starts": np.stack([STARTS, changed(1, 1, 0.9)])}, "robot_0"),

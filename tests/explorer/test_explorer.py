@@ -191,12 +191,6 @@ def test_robots_take_different_ends_of_a_corridor_unless_the_other_is_silent():
         assert bool(explorer.goal(heard, robot=1).viewpoint[0] > 10.0) is east
 
 
-def test_any_strategy_explores(seen_from_start):
-    explorer = Explorer(voxel_size_m=EDGE_M, strategy=NearestFrontier())
-    explorer.set_map(seen_from_start)
-    assert explorer.goal(START).expected_bits > 0.0
-
-
 def test_a_blocked_drive_is_not_tried_again(seen_from_start):
     explorer = Explorer(voxel_size_m=EDGE_M)
     explorer.set_map(seen_from_start)

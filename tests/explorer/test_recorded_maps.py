@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,6 @@ from entropy_explore_env.explorer.planned_rate import PlannedRate
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import SCENARIOS
 
-C2 = Path(__file__).parents[2].parent / "shared" / "worlds" / "c2"
 SEEN = {"ending": {"seen_share": 0.99}}
 
 
@@ -48,10 +45,3 @@ def check_goals(scenario, decisions, **world):
 def test_in_offices_caves_and_buildings(world, scenario, settings):
     task = SCENARIOS[scenario]
     check_goals(with_settings(task, settings) if world is None else in_world(task, world, settings), 6)
-
-
-@pytest.mark.parametrize("name", ["octa_maze", "cubicle_office"])
-def test_in_the_buildings_of_c2(name):
-    if not C2.is_dir():
-        pytest.skip("the worlds of C²-Explorer are not there")
-    check_goals(SCENARIOS["office-3d"], 3, world={"path": str(C2 / f"{name}.pcd"), "voxel_size_m": 0.2})

@@ -15,9 +15,7 @@ from entropy_explore_env.missions.action import ROUNDING as PULLED_IN_BEYOND
 from entropy_explore_env.missions.action import action_space, decode_action, encode_viewpoint
 from entropy_explore_env.missions.observation.mask import write_mask
 from entropy_explore_env.missions.rules import discrete_moves, rules_of
-from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.settings.scenarios import BOX
 from tests.reference.scenes import drawn, free_box, seeds
 
 ODD_GRID = Grid((7, 11, 5), 0.3, (-1.7, 0.4, 2.05))
@@ -269,19 +267,3 @@ def test_the_mask_marks_moves_to_voxels_inside_within_reach_and_not_believed_cov
             got = decode(rules, pose, move * gazes)
             assert np.floor(got[:3] / 0.5).tolist() == voxel.tolist()
     assert (rules.actions.moves[0] == 0).all()
-
-
-def test_moves_along_the_axes_are_to_stay_and_the_farthest_each_way():
-    """7 × 11 × 5 voxels of 0.5 m: 1 m is two voxels; in a plane nobody changes height."""
-    scenario = with_settings(BOX, {"action": {"kind": "discrete", "moves": "axes"}})
-    moves = {tuple(move) for move in rules_of(scenario).actions.moves.tolist()}
-    assert moves == {(0, 0, 0), (2, 0, 0), (-2, 0, 0), (0, 2, 0), (0, -2, 0), (0, 0, 2), (0, 0, -2)}
-    assert rules_of(scenario).actions.moves[0].tolist() == [0, 0, 0]
-    planar = with_settings(scenario, {"robot": {"motion": "planar"}})
-    assert {tuple(move) for move in rules_of(planar).actions.moves.tolist()} == {
-        move for move in moves if move[2] == 0
-    }
-    far = with_settings(scenario, {"robot": {"reach_m": 1000.0}})
-    assert (np.abs(rules_of(far).actions.moves).max(axis=0) == [6, 10, 4]).all() and len(
-        rules_of(far).actions.moves
-    ) == 7

@@ -8,55 +8,16 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.missions.poses import pose_at
+from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.changes import with_settings
-from entropy_explore_env.settings.scenarios import ROOM_FURNISHED
+from entropy_explore_env.settings.robot import Robot
+from entropy_explore_env.settings.robot_kind import RobotKind
+from entropy_explore_env.settings.scenarios import OFFICE, ROOM_FURNISHED
+from entropy_explore_env.settings.sensor import RangeSensor
 from tests.reference.scenes import TIGHT, free_box, started, wander
 
 ENDLESS = {"sigma_end": 1e-4}
 NO_PARTS = {"panorama": False, "self_state": False, "team": False}
-
-CROWDS = {
-    "big bodies in the tiny box": TIGHT,
-    "small bodies, furnished": free_box(
-        robots=5, robot={"body_radius_m": 0.24, "reach_m": 3.0}, world="furnished", observation=NO_PARTS
-    ),
-    "big bodies in a furnished room": with_settings(
-        ROOM_FURNISHED,
-        {
-            "robots": 5,
-            "robot": {"body_radius_m": 0.4, "reach_m": 6.0, "max_speed_m_s": 1.0},
-            "decision_period_s": 1.1,
-            "observation": NO_PARTS,
-            "sensor": {"angular_step_rad": math.pi / 12},
-        },
-    ),
-}
-
-
-@pytest.mark.parametrize("crowd", CROWDS)
-def test_bodies_never_overlap_and_never_stand_in_solid_voxels(crowd):
-    """At any time, not only when a step ends: robots that departed with a step are looked at within it."""
-    missions = started(with_settings(CROWDS[crowd], {"ending": ENDLESS}), seed=6)
-    grid, radius = missions.grid, missions.scenario.robot.body_radius_m
-    blocked = missions.worlds[0].layout(missions.scenario).collision_mask > 0
-    robots, closest, before_s = missions.state.robots[0], [math.inf], 0.0
-
-    def look(_step):
-        nonlocal before_s
-        now_s = missions.state.missions[0]["time_s"]
-        for time_s in np.linspace(before_s, now_s, 9):
-            places = np.array([pose_at(missions.rules.params[0], robot, time_s)[:3] for robot in robots])
-            apart = np.linalg.norm(places[:, None] - places[None], axis=-1)[np.triu_indices(len(places), 1)]
-            closest[0] = min(closest[0], apart.min())
-            assert apart.min() >= 2 * radius
-            voxels = grid.voxel_of(places)
-            assert ((voxels >= 0) & (voxels < grid.shape)).all()
-            assert not blocked[tuple(voxels.T)].any()
-        before_s = now_s
-
-    wander(missions, 100, 3, look)
-    assert closest[0] < 2.2 * radius  # they did meet
-    assert robots["blocked_moves"].min() > 5
 
 
 @pytest.mark.parametrize("world", ["empty", "furnished"])
@@ -70,3 +31,88 @@ def test_round_numbers_do_not_bring_robots_into_walls_and_furniture(world):
         voxel = missions.grid.voxel_of(missions.state.robots[0, 0]["goal"][:3])
         assert ((voxel >= 0) & (voxel < missions.grid.shape)).all()
         assert truth[tuple(voxel)] == 0.0
+
+
+def crowded(**changes):
+    """Five robots that wander in each other's way for ever."""
+    made = free_box(robots=5, world="furnished", observation=NO_PARTS)
+    return with_settings(made, {"ending": ENDLESS, **changes})
+
+
+def in_a_room(navigator, reach_m, period_s, scan_every_m):
+    """Large bodies in the furnished room."""
+    robot = {"body_radius_m": 0.4, "reach_m": reach_m, "max_speed_m_s": 1.0, "navigator": navigator}
+    settings = {"robots": 5, "robot": robot, "decision_period_s": period_s, "observation": NO_PARTS}
+    sensor = {"angular_step_rad": math.pi / 12, "scan_every_m": scan_every_m}
+    return with_settings(ROOM_FURNISHED, {**settings, "sensor": sensor, "ending": ENDLESS})
+
+
+def of_three_sizes(navigator):
+    """Bodies of 0.1, 0.24 and 0.45 m, of which the second drives straight."""
+    first, *others = (
+        RobotKind(
+            Robot(reach_m=3.0, body_radius_m=radius_m, navigator=navigates, max_speed_m_s=speed_m_s),
+            RangeSensor((0.0, 0.0), 0.1),
+        )
+        for radius_m, navigates, speed_m_s in (
+            (0.1, navigator, 0.3),
+            (0.24, "straight", 0.9),
+            (0.45, navigator, 0.5),
+        )
+    )
+    team = {"robots": 6, "robot": first.robot, "sensor": first.sensor, "extra_kinds": tuple(others)}
+    return crowded(**team, decision_period_s=0.6)
+
+
+OFFICE_CROWD = {
+    "robots": 5,
+    "robot": {"reach_m": 6.0, "body_radius_m": 0.25},
+    "sensor": {"angular_step_rad": math.pi / 30},
+    "decision_period_s": None,
+    "observation": {**NO_PARTS, "patch": True, "patch_shape": (1, 1, 1)},
+    "ending": ENDLESS,
+}
+CROWDS = {
+    "big bodies in the tiny box": (with_settings(TIGHT, {"ending": ENDLESS}), 100),
+    "small bodies": (crowded(robot={"body_radius_m": 0.24, "reach_m": 3.0}), 100),
+    "small bodies that plan": (
+        crowded(robot={"body_radius_m": 0.24, "reach_m": 3.0, "navigator": "planned"}),
+        150,
+    ),
+    "a plan": (with_settings(OFFICE, OFFICE_CROWD), 150),
+    "a room": (in_a_room("straight", 6.0, 1.1, math.inf), 100),
+    "scans that end planned drives": (in_a_room("planned", 9.0, 0.1, 0.5), 900),
+    "three sizes": (of_three_sizes("straight"), 120),
+    "three sizes that plan": (of_three_sizes("planned"), 120),
+}
+
+
+@pytest.mark.parametrize("crowd", CROWDS)
+def test_bodies_never_overlap_and_never_stand_in_solid_voxels(crowd):
+    """At any time within a step; where scans under way may end a drive, when a step ends."""
+    scenario, steps = CROWDS[crowd]
+    missions, kinds = started(scenario, seed=6), [scenario.kind_of(a) for a in range(scenario.robots)]
+    radii = np.array([kind.robot.body_radius_m for kind in kinds])
+    blocked = [missions.worlds[0].layout(scenario, kind).collision_mask > 0 for kind in kinds]
+    robots, grid, params = missions.state.robots[0], missions.grid, missions.rules.params
+    looks = 9 if math.isinf(scenario.sensor.scan_every_m) else 1
+    pairs, closest, before_s, ends = np.triu_indices(len(radii), 1), [math.inf], 0.0, set()
+
+    def look(_step):
+        nonlocal before_s
+        now_s = missions.state.missions[0]["time_s"]
+        for time_s in np.linspace(now_s, before_s, looks, endpoint=False):
+            places = np.array([pose_at(*each, time_s)[:3] for each in zip(params, robots, strict=True)])
+            apart = np.linalg.norm(places[:, None] - places[None], axis=-1) - radii[:, None] - radii
+            closest[0] = min(closest[0], apart[pairs].min())
+            assert apart[pairs].min() >= 0.0
+            voxels = grid.voxel_of(places)
+            assert ((voxels >= 0) & (voxels < grid.shape)).all()
+            assert not any(mask[tuple(voxel)] for mask, voxel in zip(blocked, voxels, strict=True))
+        before_s = now_s
+        ends.update(list(MoveEnd)[end].name for end in robots["move_end"][robots["deciding"]])
+
+    wander(missions, steps, 3, look)
+    assert closest[0] < 0.1 * 2 * radii.max()  # they did meet
+    assert "TEAMMATE" in ends and ends & {"ARRIVED", "SEEN"} and robots["blocked_moves"].min() > 1
+    assert ("NO_PATH" in ends) == (scenario.robot.navigator == "planned")

@@ -13,7 +13,7 @@ from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World
-from tests.reference.scenes import build, free_box, put, started
+from tests.reference.scenes import build, free_box, put, started, toward
 
 FLAT = Grid((7, 11, 1), 0.5)
 ALL_ROUND = {"field_of_view_rad": (2 * math.pi, 0.0), "angular_step_rad": math.pi / 90}
@@ -55,16 +55,6 @@ def at_the_wall(**changes):
     know(missions, wall_with_a_gap())
     put(missions, 0, START)
     return missions
-
-
-def toward(missions, *viewpoints):
-    """One step in which the robots are sent to viewpoints (x, y, z, yaw, pitch)."""
-    views = [view_of(missions, 0, robot) for robot in range(missions.scenario.robots)]
-    boxes = [
-        view.action_for(np.asarray(wanted, float)) for view, wanted in zip(views, viewpoints, strict=True)
-    ]
-    missions.step(np.array([boxes], np.float64), np.zeros((1, len(boxes)), np.int64))
-    return missions.state.robots[0]
 
 
 def end_of(robot):

@@ -112,32 +112,6 @@ def test_shared_knowledge_needs_a_robot_that_works():
     assert missions.over(0) is MissionEnd.STOPPED
 
 
-def test_a_mission_ends_with_the_first_scan_that_brings_one_map_below_the_threshold():
-    missions = started(free_box(ending={"sigma_end": 15.0}, channel={"burst": 0}), seed=5)
-    threshold, robots = missions.state.missions[0]["entropy_end_bits"], missions.state.robots[0]
-    before = robots["entropy_bits"].copy()
-    while missions.over(0) is MissionEnd.RUNNING:
-        assert (robots["entropy_bits"] > threshold).all()
-        before = robots["entropy_bits"].copy()
-        wander(missions, 1, missions.state.missions[0]["cycles"])
-    assert missions.over(0) is MissionEnd.MAPPED
-    assert robots["entropy_bits"].min() <= threshold < before.min()
-    assert robots["entropy_bits"].max() > threshold  # the other map is not that far yet
-
-
-def test_all_maps_below_the_threshold():
-    settings = {"ending": {"sigma_end": 20.0, "termination": "all"}, "channel": {"burst": 0}}
-    missions = started(free_box(**settings), seed=5)
-    threshold, robots = missions.state.missions[0]["entropy_end_bits"], missions.state.robots[0]
-    one_alone = False
-    while missions.over(0) is MissionEnd.RUNNING:
-        one_alone |= bool((robots["entropy_bits"] <= threshold).sum() == 1)
-        wander(missions, 1, missions.state.missions[0]["cycles"])
-    assert missions.over(0) is MissionEnd.MAPPED
-    assert one_alone
-    assert (robots["entropy_bits"] <= threshold).all()
-
-
 @pytest.mark.parametrize("period", [None, 0.8])
 def test_a_mission_is_cut_off_at_its_time_limit(period):
     missions = started(free_box(decision_period_s=period, ending={"time_limit_s": 7.3}), seed=5)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
@@ -10,7 +9,7 @@ from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.ending import gaussian_entropy_bits
 from entropy_explore_env.settings.scenarios import ROOM, ROOM_FURNISHED
-from tests.reference.scenes import free_box, started, wander
+from tests.reference.scenes import started, wander
 
 
 def test_the_paper_s_room():
@@ -36,13 +35,3 @@ def test_the_threshold_asks_for_nothing_that_cannot_be_seen():
     known, unknown = gaussian_entropy_bits(0.03), gaussian_entropy_bits(30.0)
     expected = visible * known + (28_577 - visible) * unknown
     assert clock["entropy_end_bits"] == pytest.approx(expected, rel=1e-9)
-
-
-def test_a_reset_forgets_everything_of_the_mission_before():
-    settings = {"robots": 3, "channel": {"delay_s": 0.7}, "world": "furnished"}
-    used, fresh = started(free_box(**settings), seed=1), started(free_box(**settings), seed=2)
-    wander(used, 20, 0)
-    used.reset(0, 2)
-    for name, one, other in zip(used.state._fields, used.state, fresh.state, strict=True):
-        assert one.tobytes() == other.tobytes(), name
-    np.testing.assert_array_equal(used.observations, fresh.observations)

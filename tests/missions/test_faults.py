@@ -2,45 +2,28 @@
 
 from __future__ import annotations
 
-import copy
 import math
-import pickle
 
 import numpy as np
 import pytest
 
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
-from entropy_explore_env.errors import RecordError
 from entropy_explore_env.missions.faults import draw_faults
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.records import FAULT, MissionEnd
-from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.randomness import Stream, draw_uniform
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.robots.motion import MoveEnd
-from tests.missions.replays import check_replay
-from tests.missions.test_tick import toward
-from tests.reference.scenes import free_box, put, random_actions, started, wander
+from tests.reference.scenes import free_box, put, standing, started, toward, wander
 
 HERE, FAR, STAY = (1.75, 1.75, 1.25, 0.0, 0.0), (1.75, 2.75, 1.25, 0.0, 0.0), (0.75, 4.75, 1.25, 0.0, 0.0)
 AT_ONCE = {"turn_rate_rad_s": math.inf}
-ALL_AT_ONCE = {
-    "stop": {"mean_s": 20.0, "lasts_s": 3.0},
-    "blind": {"mean_s": 15.0, "lasts_s": 6.0},
-    "silent": {"mean_s": 10.0, "lasts_s": 5.0, "robots": (0, 2)},
-    "sensor": {"lost_rays": 0.2, "range_factor": 1.05, "range_bias_m": -0.02, "robots": (1,)},
-    "radio": {"garbled": 0.2, "repeated": 0.3, "late": 0.3, "late_s": 4.0},
-}
 
 
 def team(faults, **changes):
     """Two robots of the box, about to go where they are sent; they turn at once."""
-    missions = started(free_box(faults=faults, robot={**AT_ONCE, **changes.pop("robot", {})}, **changes))
-    put(missions, 0, HERE)
-    put(missions, 1, STAY)
+    missions = standing(HERE, STAY, faults=faults, robot={**AT_ONCE, **changes.pop("robot", {})}, **changes)
     return missions
 
 
@@ -256,79 +239,6 @@ def test_drawn_times_have_the_mean_that_was_asked_for_and_streams_of_their_own()
     assert Stream.FAULTS not in (Stream.SENSOR, Stream.CHANNEL, Stream.STRATEGY)
 
 
-def faulty(**changes):
-    return free_box(
-        robots=3, faults=ALL_AT_ONCE, channel={"i_min_bits": 0.0, "loss_probability": 0.1}, **changes
-    )
-
-
-def test_missions_with_faults_do_not_depend_on_batches_or_threads():
-    scenario = faulty(decision_period_s=1.0)
-    batch = Missions(scenario, 5, threads=2)
-    for mission in range(5):
-        batch.reset(mission, 10 + mission)
-    rng = np.random.default_rng(0)
-    actions = [random_actions(batch, rng) for _ in range(40)]
-    for continuous, discrete in actions:
-        batch.step(continuous, discrete)
-    counts = batch.state.faults
-    for name in ("blind_scans", "rays_lost", "messages_silenced", "messages_garbled", "messages_late"):
-        assert counts[name].any(), name
-    assert counts["stopped"].any() and counts["messages_repeated"].any()
-    for mission in range(5):
-        alone = started(scenario, 10 + mission)
-        for continuous, discrete in actions:
-            alone.step(continuous[mission : mission + 1], discrete[mission : mission + 1])
-        assert state_digest(alone, 0) == state_digest(batch, mission)
-
-
-def test_copies_pickles_and_snapshots_in_the_middle_of_faults_go_on_alike():
-    missions = started(faulty())
-    wander(missions, 25, 0)
-    assert missions.state.faults["stopped"].any()
-    others = [copy.deepcopy(missions), pickle.loads(pickle.dumps(missions)), started(faulty(), 99)]
-    restore(others[2], snapshot(missions))
-    wander(missions, 25, 1)
-    for other in others:
-        wander(other, 25, 1)
-        assert state_digest(other, 0) == state_digest(missions, 0)
-
-
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("stop_s", math.nan),
-        ("stop_until_s", -1.0),
-        ("blind_s", -1.0),
-        ("rays_lost", -1),
-        ("messages_late", 2**60),
-    ],
-)
-def test_a_saved_state_with_impossible_faults_is_refused(field, value):
-    missions = started(faulty())
-    wander(missions, 5, 0)
-    saved, before = snapshot(missions), state_digest(missions, 0)
-    saved["faults"] = saved["faults"].copy()
-    saved["faults"][field] = value
-    with pytest.raises(RecordError, match=f"faults.{field}"):
-        restore(missions, saved)
-    assert state_digest(missions, 0) == before
-
-
-def test_a_robot_that_stands_still_for_ever_is_in_a_saved_state_only_where_robots_stop():
-    missions = started(free_box(faults={"stop": {"at_s": 2.0, "robots": (0,)}}))
-    wander(missions, 20, 0)
-    assert np.isinf(missions.state.robots["ready_s"]).any()
-    restore(started(missions.scenario, 5), snapshot(missions))
-
-
-def test_a_record_runs_again_bit_for_bit(tmp_path):
-    env, rng = EntropyExploreEnv(faulty(max_cycles=60)), np.random.default_rng(3)
-    env.reset(seed=4)
-    record = check_replay(env, lambda: rng.uniform(-1, 1, 5).astype(np.float32), None, tmp_path / "m.npz")
-    assert record.scenario.faults == faulty().faults
-
-
 def test_infos_say_who_fails_now():
     scenario = free_box(
         faults={
@@ -351,15 +261,3 @@ def test_infos_say_who_fails_now():
     assert [one for one, _ in told] == [right, left, left, right]
     assert [other for _, other in told] == [right, right, [False, False, True], [False, False, True]]
     assert [np.transpose(each).tolist() for each in batched] == told
-
-
-def test_a_state_of_a_sensor_that_measures_much_too_far_is_one_that_missions_have():
-    """Drawn once: distances far beyond the workspace were taken for what no mission holds."""
-    wrong = {"sensor": {"range_factor": 9.0, "range_bias_m": 1e5}}
-    missions = started(free_box(faults=wrong, channel={"i_min_bits": 0.0, "delay_s": 1.0}))
-    wander(missions, 12, 0)
-    assert missions.state.robots["depth_m"].max() > 1e5 and missions.state.in_flight_rays[..., 3].max() > 1e5
-    other = started(missions.scenario, 3)
-    restore(other, snapshot(missions))
-    assert state_digest(other, 0) == state_digest(missions, 0)
-    assert np.isfinite(missions.observations).all()

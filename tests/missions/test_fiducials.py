@@ -19,8 +19,7 @@ from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.worlds.load import make_world
 from entropy_explore_env.worlds.world import World
 from tests.missions.test_localization import DRIFTING, SOME, STAY, frozen
-from tests.missions.test_tick import toward
-from tests.reference.scenes import build, drawn, free_box, put, seeds, started, wander
+from tests.reference.scenes import build, drawn, free_box, put, seeds, started, toward, wander
 
 
 def test_fiducials_are_sighted_in_range_in_view_and_not_behind_anything():

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-import pickle
-
 import numpy as np
 import pytest
 
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.landmark_score import landmark_score
-from entropy_explore_env.errors import RecordError
-from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.view import view_of
-from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.settings.grid import Grid
-from tests.missions.test_tick import toward
-from tests.reference.scenes import build, free_box, put, started, wander
+from tests.reference.scenes import build, free_box, put, started, toward
 
 SOME = {"xy_m_per_sqrt_m": 0.05, "yaw_rad_per_sqrt_m": 0.02, "yaw_rad_per_sqrt_rad": 0.02}
 SHAPE = (21, 27, 1)
@@ -130,59 +123,3 @@ def test_where_none_are_asked_for_there_are_none():
     assert exact.state.landmarks.shape[1] == 0
     drifting = started(free_box(robots=2, robot={"localization": SOME}))
     assert drifting.state.landmarks.shape == (1, 2, 0)
-
-
-def three_robots():
-    return free_box(
-        robots=3,
-        world="furnished",
-        robot={"localization": SOME},
-        sensor={"field_of_view_rad": (2.0, 1.2), "max_range_m": 3.0},
-        fiducials={"number": 2, "own_number": 4, "own_score": 0.3, "own_apart_m": 0.5},
-        track_truth=True,
-    )
-
-
-def test_missions_with_landmarks_are_the_same_in_batches_copied_and_restored():
-    alone, batch = started(three_robots(), seed=6), started(three_robots(), seed=5, missions=2)
-    for missions in (alone, batch):
-        wander(missions, 10, 1)
-    assert alone.state.landmarks["used"].any()
-    other = Missions(three_robots(), 1)
-    other.reset(0, 1)
-    restore(other, snapshot(alone))
-    copied = pickle.loads(pickle.dumps(alone))
-    for missions in (alone, other, copied):
-        wander(missions, 6, 2)
-    assert state_digest(alone, 0) == state_digest(other, 0) == state_digest(copied, 0)
-
-
-def test_an_episode_begins_without_landmarks():
-    missions = started(three_robots(), seed=6)
-    wander(missions, 10, 1)
-    assert missions.state.landmarks["used"].any()
-    missions.reset(0, 7)
-    fresh = started(three_robots(), seed=7)
-    wander(missions, 5, 3)
-    wander(fresh, 5, 3)
-    assert (missions.state.landmarks == fresh.state.landmarks).all()
-
-
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [("score", 2.5), ("sightings", -1), ("place", 99.0), ("seen_from", np.nan), ("covariance", np.inf)],
-)
-def test_a_saved_state_with_impossible_landmarks_is_refused(field, value):
-    missions = started(three_robots())
-    arrays = snapshot(missions)
-    arrays["landmarks"][field][0, 1, 2] = value
-    with pytest.raises(RecordError, match=rf"landmarks\.{field}"):
-        restore(missions, arrays)
-
-
-def test_a_landmark_that_was_chosen_at_the_edge_of_the_workspace_may_be_beyond_it_by_rounding():
-    missions = started(three_robots())
-    arrays = snapshot(missions)
-    arrays["landmarks"]["seen_from"][0, 1, 2, 0] = missions.grid.origin_m[0] - 1e-12
-    restore(missions, arrays)
-    assert missions.state.landmarks["seen_from"][0, 1, 2, 0] < missions.grid.origin_m[0]

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import copy
 import math
-import pickle
 
 import numpy as np
 import pytest
@@ -12,22 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
-from entropy_explore_env.errors import RecordError
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.robots.channel import BITS_PER_BATCH, BITS_PER_COVARIANCE, BITS_PER_MEASUREMENT
-from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.json import scenario_of, settings_of
 from entropy_explore_env.settings.localization import Localization
-from tests.missions.replays import check_replay
-from tests.missions.test_tick import toward
-from tests.reference.scenes import build, drawn, free_box, put, random_actions, seeds, started, wander
+from tests.reference.scenes import build, drawn, free_box, put, seeds, started, toward, wander
 
 SOME = {
     "xy_m_per_sqrt_m": 0.05,
@@ -275,86 +266,6 @@ def test_what_a_robot_sees_and_says_is_where_it_believes_to_be():
         assert (mate.pose != own["scan_pose"]).any() and np.abs(sent[0] - sent[1])[:3].max() < 1.0
 
 
-def drifting(**changes):
-    return free_box(
-        robots=3,
-        robot={"localization": SOME, "redecide": "on_scan"},
-        sensor={"scan_every_m": 0.4, "range_noise_m": 0.02},
-        channel={"i_min_bits": 0.0, "loss_probability": 0.1, "delay_s": 0.3},
-        fiducials={"number": 4},
-        **changes,
-    )
-
-
-def test_missions_that_drift_do_not_depend_on_batches_or_threads():
-    scenario = drifting(decision_period_s=1.0)
-    batch = Missions(scenario, 5, threads=2)
-    batch.reset_some(range(5), list(range(10, 15)))
-    rng = np.random.default_rng(0)
-    actions = [random_actions(batch, rng) for _ in range(30)]
-    for continuous, discrete in actions:
-        batch.step(continuous, discrete)
-    assert (batch.state.estimates["sightings"] > 0).any() and batch.state.estimates["error"].all()
-    for mission in range(5):
-        alone = started(scenario, 10 + mission)
-        for continuous, discrete in actions:
-            alone.step(continuous[mission : mission + 1], discrete[mission : mission + 1])
-        assert state_digest(alone, 0) == state_digest(batch, mission)
-
-
-@pytest.mark.parametrize("channel", CHANNELS)
-def test_copies_pickles_and_snapshots_go_on_alike(channel):
-    scenario = with_settings(drifting(), {"channel": {"delay_s": 0.0, **channel}})
-    missions = started(scenario)
-    wander(missions, 25, 0)
-    others = [copy.deepcopy(missions), pickle.loads(pickle.dumps(missions)), started(scenario, 99)]
-    restore(others[2], snapshot(missions))
-    wander(missions, 25, 1)
-    for other in others:
-        wander(other, 25, 1)
-        assert state_digest(other, 0) == state_digest(missions, 0)
-    changed = pickle.loads(pickle.dumps(missions))
-    changed.state.estimates["covariance"][0, 0, 1, 1] += 1e-9
-    assert state_digest(changed, 0) != state_digest(missions, 0)
-
-
-@pytest.mark.parametrize(
-    ("field", "value"),
-    [
-        ("place", math.nan),
-        ("place", -3.0),
-        ("error", 1e9),
-        ("covariance", math.inf),
-        ("covariance", -1.0),
-        ("covariance", np.diag([1.0, 1.0, 1.0], 1)),
-        ("covariance", np.diag([1.0, 1.0, 1.0, 1.0]) + 3.0 * np.diag([1.0, 0.0, 0.0], 1)),
-        ("covariance", 2.0 * np.ones((4, 4)) - np.eye(4)),
-        ("packed", 1e99),
-        ("scan_pose", 1e3),
-        ("yaw", 50.0),
-        ("driven_m", -5.0),
-        ("sightings", -1),
-        ("squared_m2", -1.0),
-    ],
-)
-def test_a_saved_state_with_impossible_estimates_is_refused(field, value):
-    missions = started(drifting())
-    wander(missions, 5, 0)
-    saved, before = snapshot(missions), state_digest(missions, 0)
-    saved["estimates"] = saved["estimates"].copy()
-    saved["estimates"][field] = value
-    with pytest.raises(RecordError, match=f"estimates.{field}"):
-        restore(missions, saved)
-    assert state_digest(missions, 0) == before
-
-
-def test_a_record_runs_again_bit_for_bit(tmp_path):
-    env, rng = EntropyExploreEnv(drifting(max_cycles=50)), np.random.default_rng(3)
-    env.reset(seed=4)
-    record = check_replay(env, lambda: rng.uniform(-1, 1, 5).astype(np.float32), None, tmp_path / "m.npz")
-    assert record.scenario == env.scenario
-
-
 def test_drift_changes_neither_worlds_starts_nor_noise_nor_losses():
     changes = {"robots": 3, "world": "furnished", "channel": {"loss_probability": 0.3}}
     told = []
@@ -371,9 +282,8 @@ def test_drift_changes_neither_worlds_starts_nor_noise_nor_losses():
 
 def test_infos_and_figures_say_how_wrong_robots_are():
     scenario = free_box(decision_period_s=1.0, max_cycles=12, **DRIFTING)
-    env, envs = EntropyExploreEnv(scenario), EntropyExploreVectorEnv(scenario, num_envs=2)
+    env = EntropyExploreEnv(scenario)
     _, told = env.reset(seed=0)
-    envs.reset(seed=0)
     assert {info["pose_error_m"] for info in told.values()} == {0.0}
     rng = np.random.default_rng(0)
     while env.agents:

@@ -9,39 +9,19 @@ import pickle
 import numpy as np
 import pytest
 
-from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.rules import rules_of
-from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import information_floor
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.settings.json import scenario_of, settings_of
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.robot_kind import RobotKind
-from entropy_explore_env.settings.scenarios import OFFICE_3D, OFFICE_MIXED
 from entropy_explore_env.settings.sensor import RangeSensor
-from tests.reference.scenes import free_box, put, random_actions, started, wander
+from tests.missions.kinds import GROUND, SCOUT
+from tests.reference.scenes import free_box, put, random_actions, started
 
-GROUND = RobotKind(
-    Robot(
-        motion="planar",
-        reach_m=1.2,
-        max_speed_m_s=0.3,
-        acceleration_m_s2=0.2,
-        turn_rate_rad_s=0.7,
-        body_radius_m=0.0,
-        sensor_height_m=0.9,
-    ),
-    RangeSensor((math.pi, 0.0), math.pi / 12, max_range_m=2.5, sigma_min=0.2, range_noise_m=0.1),
-)
-SCOUT = RobotKind(
-    Robot(reach_m=0.8, max_speed_m_s=1.0, acceleration_m_s2=1.5, body_radius_m=0.0, navigator="planned"),
-    RangeSensor((math.pi / 6, math.pi / 6), math.pi / 30, voxels_behind=0, scan_time_s=0.8, scan_every_m=0.3),
-)
 SILENT = {"burst": 0, "announcements": False}
 ENDLESS = {"sigma_end": 1e-3, "time_limit_s": math.inf}
 
@@ -171,38 +151,6 @@ def test_bodies_of_two_sizes_by_hand():
     np.testing.assert_array_equal(missions.state.collision, [each.ravel() for each in blocked])
 
 
-@pytest.mark.parametrize("navigator", ["straight", "planned"])
-def test_bodies_of_many_sizes_never_overlap(navigator):
-    kinds = [
-        RobotKind(dataclasses.replace(kind.robot, navigator=navigates, max_speed_m_s=speed), kind.sensor)
-        for kind, navigates, speed in zip(
-            with_bodies(0.1, 0.24, 0.45), (navigator, "straight", navigator), (0.3, 0.9, 0.5), strict=True
-        )
-    ]
-    missions = started(box_of(kinds, robots=6, world="furnished", decision_period_s=0.6), seed=5)
-    radii = np.array([missions.scenario.kind_of(robot).robot.body_radius_m for robot in range(6)])
-    world, grid, params = missions.worlds[0], missions.grid, missions.rules.params
-    blocked = [
-        world.layout(missions.scenario, missions.scenario.kind_of(robot)).collision_mask > 0
-        for robot in range(6)
-    ]
-    closest, before_s = [math.inf], [0.0]
-
-    def look(_step):
-        now_s, robots = missions.state.missions[0]["time_s"], missions.state.robots[0]
-        for time_s in np.linspace(before_s[0], now_s, 5):
-            places = np.array([pose_at(params[a], robot, time_s)[:3] for a, robot in enumerate(robots)])
-            apart = np.linalg.norm(places[:, None] - places[None], axis=-1) - radii[:, None] - radii
-            closest[0] = min(closest[0], apart[np.triu_indices(6, 1)].min())
-            for robot, voxel in enumerate(grid.voxel_of(places)):
-                assert not blocked[robot][tuple(voxel)], robot
-        before_s[0] = now_s
-
-    wander(missions, 120, 3, look)
-    assert 0.0 <= closest[0] < 0.01
-    assert missions.state.robots[0]["blocked_moves"].min() > 3
-
-
 def test_the_mask_and_the_actions_of_each_kind():
     kinds = (
         RobotKind(dataclasses.replace(GROUND.robot, reach_m=0.5), GROUND.sensor),
@@ -267,43 +215,6 @@ def test_the_threshold_asks_for_what_any_robot_can_see():
     world = started(mixed).worlds[0]
     floors = [information_floor(box_of(kinds, robots=2), world) for kinds in ((GROUND, SCOUT), (SCOUT,))]
     assert floors[0] == pytest.approx(floors[1])  # the better eye decides
-
-
-def test_entropies_are_those_of_the_maps():
-    missions = started(
-        box_of(KINDS, robots=4, channel={"delay_s": 0.7, "burst": 9}, track_truth=True), seed=8
-    )
-    wander(missions, 80, 6)
-    for robot in range(4):
-        entropy = float(map_entropy_bits(missions.precision[0, robot]))
-        assert missions.state.robots[0, robot]["entropy_bits"] == pytest.approx(entropy, rel=1e-6)
-    assert missions.state.robots[0]["messages_received"].min() > 10
-
-
-def test_many_missions_threads_and_copies_agree():
-    scenario = box_of(KINDS, robots=3, world="furnished")
-    batch = Missions(scenario, 4, threads=2)
-    batch.reset_some(range(4), range(4))
-    alone = [started(scenario, seed=seed) for seed in range(4)]
-    rng = np.random.default_rng(1)
-    for step in range(25):
-        boxes, numbers = random_actions(batch, rng)
-        batch.step(boxes, numbers)
-        for mission, one in enumerate(alone):
-            one.step(boxes[mission : mission + 1], numbers[mission : mission + 1])
-        if step == 12:
-            batch.close()
-            batch = pickle.loads(pickle.dumps(batch))
-    for mission, one in enumerate(alone):
-        np.testing.assert_array_equal(batch.state.robots[mission], one.state.robots[0])
-        np.testing.assert_array_equal(batch.state.precision[mission], one.state.precision[0])
-        np.testing.assert_array_equal(batch.observations[mission], one.observations[0])
-    batch.close()
-
-
-def test_settings_of_a_mixed_team_survive_json():
-    assert scenario_of(settings_of(OFFICE_MIXED)) == OFFICE_MIXED
-    assert OFFICE_MIXED.kind_of(1).robot == OFFICE_3D.robot
 
 
 def test_what_does_not_fit_any_kind_is_refused():

@@ -8,14 +8,10 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
-from entropy_explore_env.belief.map_update import fuse_scan
-from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.view import view_of
-from entropy_explore_env.robots.range_sensor import Scene, SensorPose, new_scan, sensor_model, take_scan
 from entropy_explore_env.settings.ending import gaussian_entropy_bits
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.viewpoints.evaluation import robot_model
 from tests.reference import rocha04
 from tests.reference.scenes import as_reference, free_box, put, random_actions, started, wander
@@ -200,19 +196,6 @@ def test_patch(mission):
     assert outside_seen
 
 
-def test_a_teammate_in_the_patch():
-    grid = Grid((7, 11, 5), 0.5, (-1.0, 2.0, 0.5))
-    missions = started(
-        free_box(grid=grid, robots=2, observation=EVERYTHING, robot={"body_radius_m": 0.0}), seed=3
-    )
-    put(missions, 0, (0.75, 4.75, 1.75, 0, 0))  # voxel (3, 5, 2)
-    put(missions, 1, (0.25, 5.75, 2.25, 0, 0))  # voxel (2, 7, 3)
-    missions.step(np.zeros((1, 2, 5)), np.zeros((1, 2), np.int64))
-    first, second = (missions.layout.split(row)["patch"] for row in missions.observations[0])
-    assert np.argwhere(first[3]).tolist() == [[1, 5, 2]]  # patch (5, 7, 3), middle (2, 3, 1)
-    assert np.argwhere(second[3]).tolist() == [[3, 1, 0]]
-
-
 def test_overview(mission):
     missions, parts = mission
     size = missions.grid.shape
@@ -265,39 +248,6 @@ def test_panorama_is_what_the_paper_s_equations_promise(mission):
             assert bits == pytest.approx(promised, rel=1e-4, abs=1e-4)
             compared += 1
     assert compared > 0.5 * len(gazes) * len(parts)
-
-
-def test_panorama_is_what_a_scan_there_would_bring_if_the_belief_were_the_truth(mission):
-    missions, parts = mission
-    grid, settings = missions.grid, missions.scenario.sensor
-    one_ray = RangeSensor(
-        (0.0, 0.0),
-        0.1,
-        settings.max_range_m,
-        settings.sigma_min,
-        settings.sigma_slope_per_m,
-        voxels_behind=settings.voxels_behind,
-        min_range_m=settings.min_range_m,
-    )
-    model, scan = sensor_model(one_ray), new_scan(grid, [one_ray], 1)
-    for robot, part in enumerate(parts):
-        start = (pose_of(missions, robot)[:3] - grid.origin_m) / grid.voxel_size_m
-        truth = missions.mean[0, robot].ravel().copy()
-        scene, place = Scene(truth, grid.shape, grid.voxel_size_m, np.zeros((0, 4))), tuple(start.tolist())
-        for gaze, bits, range_m in zip(
-            panorama_gazes(missions), *part["panorama"].astype(float), strict=True
-        ):
-            mean, precision = truth.copy(), missions.precision[0, robot].ravel().copy()
-            take_scan(scan, model, scene, SensorPose(place, *map(float, gaze)), np.zeros(1, np.uint64))
-            scan.order[0] = 0
-            brought = fuse_scan(scan, 1, mean, precision)
-            if missions.scenario.observation.panorama_utility == "log2":
-                brought = math.log2(1 + brought)
-            # The slow pose differs in the last places: through an edge that decides about a voxel.
-            if rocha04.is_generic(start, rocha04.gaze(*gaze), grid.shape, math.inf, margin=1e-4):
-                assert bits == pytest.approx(brought, rel=1e-4, abs=1e-4)
-                if scan.rays["returned"][0] != Return.NOTHING:
-                    assert range_m == pytest.approx(scan.rays["range_m"][0], rel=1e-4)
 
 
 def test_parts_left_out_leave_no_numbers():

@@ -7,7 +7,6 @@ import pytest
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.channel import Channel
 from tests.reference.scenes import free_box, started, wander
@@ -82,19 +81,6 @@ def test_a_teammate_is_heard_again_when_it_repeats_what_is_known():
         assert heard == [latest, latest]
 
 
-def test_repeats_make_up_for_lost_messages():
-    shares = []
-    for repeats in (1, 4):
-        missions = played(120, phase_s=4.0, repeats=repeats, loss_probability=0.5)
-        measured = robots_of(missions, "measurements")
-        waiting = missions.state.phase_batches[0]["count"].sum()
-        assert robots_of(missions, "messages_lost").sum() > 0 and waiting > 0
-        scans = robots_of(missions, "scans").sum()
-        shares.append(robots_of(missions, "measurements_received").sum() / (2 * 8 * scans))
-        assert measured.sum() > 0
-    assert shares[0] < 0.65 and shares[1] > 0.8
-
-
 def test_what_a_broadcast_does_not_reach_is_counted_and_waits_no_longer():
     for channel in ({"range_m": 0.1}, {"reach": "signal", "signal": {"budget_db": -110.0}}):
         missions = played(phase_s=4.0, **channel)
@@ -117,21 +103,6 @@ def test_what_a_silent_radio_broadcasts_is_counted_and_heard_by_nobody():
     sent, heard = robots_of(missions, "messages_sent"), robots_of(missions, "messages_received")
     assert silenced[1] > 0 and heard[1] == 0
     assert heard[0] == sent[2] and heard[2] == sent[0]
-
-
-def test_a_lossless_broadcast_brings_what_sending_at_once_brings():
-    """After the last phase all three hold the same measurements, in another order."""
-    at_once, phased = played(80), played(80, phase_s=0.25)
-    unsent = phased.state.phase_counts[0].sum()
-    assert unsent <= 6
-    np.testing.assert_allclose(
-        robots_of(at_once, "entropy_bits"), robots_of(phased, "entropy_bits"), rtol=0.02
-    )
-
-
-def test_no_loss_is_drawn_twice_and_the_same_seed_gives_the_same_mission():
-    digests = [state_digest(played(phase_s=3.0, repeats=2, loss_probability=0.3), 0) for _ in range(2)]
-    assert digests[0] == digests[1]
 
 
 def test_without_phases_no_state_is_kept_for_them():

@@ -1,15 +1,11 @@
 """Candidates as state: saved, restored, pickled, batched, replayed and seen through views."""
 
-import copy
 import math
-import pickle
 
 import numpy as np
 import pytest
 
-from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import ActionError, RecordError
-from entropy_explore_env.missions.snapshot import restore, snapshot
+from entropy_explore_env.errors import ActionError
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.missions.view_observation import ViewObserver
@@ -21,8 +17,7 @@ from entropy_explore_env.settings.action import Action
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.observation import Observation
-from tests.missions.replays import check_replay
-from tests.reference.scenes import free_box, random_actions, started, wander
+from tests.reference.scenes import free_box, started, wander
 
 MOST = 9
 ACTION = Action("candidates", candidates=MOST)
@@ -35,86 +30,13 @@ def walked(steps=8, seed=1, missions=2, **changes):
     return these
 
 
-def everything(missions):
-    digests = [state_digest(missions, mission) for mission in range(missions.count)]
-    return digests, missions.observations.tobytes()
-
-
-@pytest.mark.parametrize("way", ["restored", "copied", "pickled"])
-def test_missions_go_on_bitwise_from_where_they_were(way):
-    missions = walked()
-    if way == "restored":
-        others = walked(3, 20)
-        restore(others, snapshot(missions))
-    else:
-        others = copy.deepcopy(missions) if way == "copied" else pickle.loads(pickle.dumps(missions))
-    assert everything(others) == everything(missions)
-    for each in (missions, others):
-        wander(each, 10, 3)
-    assert everything(others) == everything(missions)
-
-
-def test_a_mission_is_the_same_alone_and_in_a_batch():
-    batch = walked(12, 4, missions=3)
-    for mission in range(3):
-        alone, rng = started(batch.scenario, 4 + mission), np.random.default_rng(4)
-        for _ in range(12):
-            _, numbers = random_actions(batch, rng)
-            alone.step(np.zeros((1, 2, 1)), numbers[mission : mission + 1])
-        assert state_digest(alone, 0) == state_digest(batch, mission)
-        np.testing.assert_array_equal(alone.observations[0], batch.observations[mission])
-
-
-def test_candidates_are_part_of_the_digest_where_they_are_actions():
-    missions = walked()
-    before = state_digest(missions, 0)
-    missions.state.experience[0, 1]["patience"] += 1
-    assert state_digest(missions, 0) != before
-    without = started(free_box())
-    assert without.state.candidates.size == without.state.experience.size == 0
-
-
-def test_a_record_is_replayed_bitwise(tmp_path):
-    env, rng = EntropyExploreEnv(free_box(action=ACTION, observation=SEEN)), np.random.default_rng(0)
-    env.reset(seed=3)
-    check_replay(env, lambda: np.int64(rng.integers(MOST)), 15, tmp_path / "mission.npz")
-
-
-SPOILED = [
-    ("candidates", "viewpoint", 1e9),
-    ("candidates", "goal", math.nan),
-    ("candidates", "goal", 13.0),
-    ("candidates", "kind", 4),
-    ("candidates", "bits", -1.0),
-    ("experience", "failures", -1),
-    ("experience", "goal", -13.0),
-    ("experience", "failed", math.inf),
-    ("experience", "share", 1.5),
-    ("experience", "far_at", math.nan),
-    ("experience", "most_bits", math.nan),
-    ("experience", "blocked", -1),
-]
-
-
-@pytest.mark.parametrize(("name", "field", "value"), SPOILED)
-def test_a_number_that_no_mission_holds_is_refused_by_name(name, field, value):
-    arrays, others = snapshot(walked()), walked(3, 8)
-    before = everything(others)
-    array = arrays[name][field]
-    array[(-1,) * array.ndim] = value
-    with pytest.raises(RecordError) as raised:
-        restore(others, arrays)
-    assert raised.value.field.startswith(f"{name}.{field}")
-    assert everything(others) == before
-
-
 def test_numbers_beyond_the_candidates_are_refused():
     missions = walked()
-    before = everything(missions)
+    before = state_digest(missions, 0), missions.observations.tobytes()
     for number in (-1, MOST):
         with pytest.raises(ActionError, match=f"from 0 to {MOST - 1}"):
             missions.step(np.zeros((2, 2, 1)), np.full((2, 2), number))
-    assert everything(missions) == before
+    assert (state_digest(missions, 0), missions.observations.tobytes()) == before
 
 
 def test_views_hold_the_candidates_and_write_them_as_actions():

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-import pickle
 
 import numpy as np
 import pytest
 
 from entropy_explore_env.missions.poses import driven_metres, pose_at, speed_at
 from entropy_explore_env.missions.redecision import CHOICE, braking_metres, keeps_speed, keeps_target
-from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.view import view_of
-from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.robots.motion import MoveEnd
 from tests.missions.test_driving import (
     ALL_ROUND,
@@ -22,10 +18,9 @@ from tests.missions.test_driving import (
     at_the_wall,
     end_of,
     planner,
-    toward,
     wall_with_a_gap,
 )
-from tests.reference.scenes import build, free_box, put, started, wander
+from tests.reference.scenes import build, free_box, put, started, toward
 
 START = (0.75, 0.75, 0.25, 0.0, 0.0)
 FAR = (0.75, 4.75, 0.25, 0.0, 0.0)
@@ -312,28 +307,6 @@ def test_a_robot_announces_a_changed_decision_only():
     announced = view_of(missions, 0, 1).teammates[0]
     assert announced.announced_s == now_s
     assert announced.viewpoint == pytest.approx((0.75, 2.75, 0.25, 0.0, 0.0), abs=1e-6)
-
-
-@pytest.mark.parametrize("redecide", ["on_scan", 0.4])
-def test_missions_with_decisions_under_way_are_kept_copied_and_run_again(redecide):
-    """Bit for bit: a batch and its snapshot, its pickle, and on two threads."""
-    scenario = free_box(
-        robot={"navigator": "planned", "redecide": redecide, "reach_m": 3.0},
-        sensor={"scan_every_m": 0.5},
-        decision_period_s=0.3,
-        ending={"sigma_end": 1e-4},
-    )
-    missions = started(scenario, missions=3)
-    wander(missions, 12, 1)
-    assert missions.state.robots["under_way"].any()
-    copied, restored = pickle.loads(pickle.dumps(missions)), Missions(scenario, 3, threads=2)
-    restore(restored, snapshot(missions))
-    for each in (missions, copied, restored):
-        wander(each, 25, 2)
-    digests = [[state_digest(each, mission) for mission in range(3)] for each in (missions, copied, restored)]
-    assert digests[0] == digests[1] == digests[2]
-    missions.state.robots["lead_s"][0, 0] += 0.125
-    assert state_digest(missions, 0) != digests[0][0]
 
 
 @pytest.mark.parametrize("redecide", ["on_scan", 0.9])

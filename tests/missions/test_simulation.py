@@ -347,8 +347,9 @@ def test_steps_before_a_reset_and_counts_that_are_none():
     for count in (0, -1, 1.5, True, "2"):
         with pytest.raises(SettingError, match=r"missions = .*: expected a whole number ≥ 1"):
             Missions(free_box(), count)
+    for threads in (0, -1, 1.5, True, "2", 1025, 10**39):
         with pytest.raises(SettingError, match=r"threads = .*: expected None, or a whole number from 1"):
-            Missions(free_box(), 1, count)
+            Missions(free_box(), 1, threads)
 
 
 def test_read_only_and_other_kinds_of_actions_need_no_other_kernel():

@@ -13,7 +13,6 @@ from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.pooling import Pool, fresh_sums, pool_belief
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.summaries import precision_of_place
-from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.robots.localization import pack_covariance
 from entropy_explore_env.robots.map_summary import decode_map, encode_map, is_summary
 from tests.reference.scenes import drawn, free_box, random_actions, seeds, started, wander
@@ -103,74 +102,56 @@ def test_an_own_map_is_the_belief_without_the_prior_and_without_what_was_heard()
         assert kept["high"].tolist() == (places.max(axis=0) + 1).tolist()
 
 
-CASES = [
-    {},
-    {"channel": {"delay_s": 3.0, "summary_every_s": 0.0}},
-    {"channel": {"loss_probability": 0.4, "range_m": 2.5}},
-    {"channel": {"reach": "line_of_sight"}},
-    {"channel": {"delay_s": 1.0}, "faults": FAULTS},
-    {"channel": {"summary_threshold_bits": 5.0}, "decision_period_s": 1.0},
-    {"robot": {"localization": DRIFT}, "fiducials": {"number": 4}},
-    {"robot": {"localization": DRIFT}, "channel": {"delay_s": 2.0}, "faults": FAULTS},
-    {"grid": {"shape": (9, 14, 1)}, "observation": {"overview": True, "overview_shape": (3, 4, 1)}},
-]
+RADIO = {"repeated": 0.6, "late": 0.5, "late_s": 3.0}
 
 
-@pytest.mark.parametrize("changes", CASES)
-def test_no_measurement_comes_twice_and_none_more_precise_than_it_was(changes):
-    """The joint map holds every measurement once: no robot's map is anywhere more precise than that."""
-    missions = played(120, **changes)
-    state = missions.state
-    assert robots_of(missions, "heard_bits").min() > 0.0
-    assert (state.precision[0] <= state.joint_precision[0] * (1.0 + 1e-4)).all()
-    own = robots_of(missions, "gained_bits") + robots_of(missions, "heard_bits")
-    carried, start = robots_of(missions, "entropy_bits"), state.missions[0]["entropy_start_bits"]
-    np.testing.assert_allclose(carried, map_entropy_bits(missions.precision[0]), rtol=1e-5)
-    np.testing.assert_allclose(start - carried, own, rtol=1e-5)
-
-
-@drawn(25)
+@drawn(40)
 @given(
     seeds,
-    st.sampled_from([0.0, 1.0, 4.0]),
-    st.sampled_from([0.0, 0.5, 5.0]),
-    st.sampled_from([0.0, 0.4]),
-    st.sampled_from(
-        [{}, {"radio": {"repeated": 0.6}}, {"radio": {"repeated": 0.6, "late": 0.5, "late_s": 3.0}}]
+    st.integers(2, 3),
+    st.fixed_dictionaries(
+        {
+            "summary_every_s": st.sampled_from([0.0, 1.0, 4.0]),
+            "summary_threshold_bits": st.sampled_from([0.0, 0.5, 5.0]),
+            "loss_probability": st.sampled_from([0.0, 0.4]),
+            "delay_s": st.sampled_from([0.0, 0.5, 3.0]),
+            "reach": st.sampled_from(["distance", "line_of_sight"]),
+        }
     ),
+    st.sampled_from([{}, {"radio": RADIO}, FAULTS]),
     st.sampled_from([None, DRIFT]),
+    st.sampled_from([{}, {"grid": {"shape": (9, 14, 1)}}]),
 )
-def test_what_a_robot_has_from_another_is_never_more_than_that_one_measured(
-    seed, every_s, threshold, loss, faults, drift
+def test_no_measurement_comes_twice_and_none_more_precise_than_it_was(
+    seed, robots, channel, faults, drift, grid
 ):
-    """Of two robots: the sum of all summaries that came, against the sum of all that their sender measured.
+    """The joint map holds every measurement once, at the precision that its own robot gave it.
 
-    The joint map holds each measurement of both at the precision that its own robot gave it. So what is more
-    in it than in a robot's own measurements is what the other measured, all its summaries together.
+    No robot's map is anywhere more precise than that. So what is more in it than in a robot's own
+    measurements is what the others measured, all their summaries together.
     """
     missions = played(
         50,
         seed % 1000,
-        robots=2,
+        robots=robots,
         robot={"localization": drift} if drift else {},
         fiducials={"number": 3} if drift else {},
         faults=faults,
-        channel={
-            **QUIET,
-            "summary_every_s": every_s,
-            "summary_threshold_bits": threshold,
-            "loss_probability": loss,
-            "delay_s": 0.5,
-        },
+        channel={**QUIET, **channel},
+        **grid,
     )
     state, prior = missions.state, np.float64(missions.rules.params["prior_precision"][0])
     known, joint = state.precision[0].astype(float), state.joint_precision[0].astype(float)
-    for robot in range(2):
-        heard = int(robots_of(missions, "messages_received")[robot])
-        assert heard > 1 or loss or faults
-        assert (known[robot] <= joint * (1.0 + 1e-4)).all()
-        measured = joint > prior * (1.0 + 1e-6)
-        assert (known[robot][~measured] <= prior * (1.0 + 1e-6)).all()
+    measured = joint > prior * (1.0 + 1e-6)
+    assert (known <= joint * (1.0 + 1e-4)).all()
+    assert (known[:, ~measured] <= prior * (1.0 + 1e-6)).all()
+    own = robots_of(missions, "gained_bits") + robots_of(missions, "heard_bits")
+    carried, start = robots_of(missions, "entropy_bits"), state.missions[0]["entropy_start_bits"]
+    np.testing.assert_allclose(carried, map_entropy_bits(missions.precision[0]), rtol=1e-5)
+    np.testing.assert_allclose(carried + own, start, rtol=1e-5)
+    if channel["reach"] == "distance" and not channel["loss_probability"] and not faults:
+        assert robots_of(missions, "messages_received").min() > 1
+        assert robots_of(missions, "heard_bits").min() > 0.0
 
 
 def test_summaries_bring_nearly_all_that_teammates_measured():
@@ -181,18 +162,6 @@ def test_summaries_bring_nearly_all_that_teammates_measured():
     shares = (known - prior)[:, measured] / (joint - prior)[measured]
     assert shares.mean() > 0.9  # a leaf is as precise as its least known voxel
     assert (known[:, ~measured] <= 2.0 * prior).all()
-
-
-def test_a_coarser_summary_and_a_rarer_one_cost_less():
-    bits = [
-        robots_of(played(80, channel={**QUIET, **channel}), "bits_sent").sum()
-        for channel in (
-            {"summary_every_s": 0.0, "summary_threshold_bits": 0.0},
-            {"summary_threshold_bits": 0.0},
-            {"summary_threshold_bits": 5.0},
-        )
-    ]
-    assert bits[0] > 1.1 * bits[1] and bits[1] > bits[2] > 0
 
 
 def test_the_pooled_belief_follows_what_summaries_say():
@@ -262,13 +231,6 @@ def test_a_place_is_known_as_well_as_its_covariance_says():
     assert math.isinf(precision_of_place(packed, 0.5))
     pack_covariance(np.diag([0.04, 0.01, 0.0, 9.0]), packed)
     assert precision_of_place(packed, 0.5) == pytest.approx(0.25 / 0.05)  # the yaw is no part of it
-
-
-def test_the_same_seed_gives_the_same_mission_in_any_batch_and_on_any_threads():
-    changes = {"channel": {"delay_s": 1.0, "loss_probability": 0.2}, "faults": FAULTS}
-    batch = played(40, seed=3, count=5, threads=2, **changes)
-    alone = played(40, seed=3, count=5, threads=1, **changes)
-    assert [state_digest(batch, m) for m in range(5)] == [state_digest(alone, m) for m in range(5)]
 
 
 def test_without_summaries_no_state_is_kept_for_them():

@@ -17,26 +17,14 @@ from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference import rocha04
-from tests.reference.scenes import build, free_box, put, random_actions, started, wander
+from tests.reference.scenes import build, free_box, put, random_actions, standing, started, toward, wander
 
-STAY = np.zeros((1, 2), np.int64)
 ONE_RAY = {"field_of_view_rad": (0.0, 0.0)}
-
-
-def toward(missions, *viewpoints):
-    """One step in which the robots are sent to viewpoints (x, y, z, yaw, pitch)."""
-    views = [view_of(missions, 0, robot) for robot in range(missions.scenario.robots)]
-    boxes = [
-        view.action_for(np.asarray(wanted, float)) for view, wanted in zip(views, viewpoints, strict=True)
-    ]
-    missions.step(np.array([boxes], np.float64), np.zeros((1, len(boxes)), np.int64))
-    return missions.state.robots[0]
 
 
 def test_a_drive_takes_its_time_and_scans_at_its_end():
     """1 m at 0.5 m/s and 0.5 m/s²: 1 s up, 1 s along, 1 s down; then 0.5 s for the scan."""
-    missions = started(free_box(robots=1, robot={"turn_rate_rad_s": math.inf}))
-    put(missions, 0, (1.75, 1.75, 1.25, 0.0, 0.0))
+    missions = standing((1.75, 1.75, 1.25, 0.0, 0.0), robot={"turn_rate_rad_s": math.inf})
     robots = toward(missions, (1.75, 2.75, 1.25, 1.0, -0.5))
     assert missions.state.missions[0]["time_s"] == pytest.approx(3.5)
     assert robots["goal"][0] == pytest.approx([1.75, 2.75, 1.25, 1.0, -0.5], abs=1e-6)
@@ -47,8 +35,7 @@ def test_a_drive_takes_its_time_and_scans_at_its_end():
 
 
 def test_turning_happens_while_driving_and_may_take_longer():
-    missions = started(free_box(robots=1, robot={"turn_rate_rad_s": 0.5}))
-    put(missions, 0, (1.75, 1.75, 1.25, 3.0, 0.0))
+    missions = standing((1.75, 1.75, 1.25, 3.0, 0.0), robot={"turn_rate_rad_s": 0.5})
     robots = toward(missions, (1.75, 2.75, 1.25, -2.0, 0.25))  # 1.2832 rad through straight behind
     turn_s = (2 * math.pi - 5.0) / 0.5
     assert missions.state.missions[0]["time_s"] == pytest.approx(max(turn_s, 3.0) + 0.5)
@@ -57,8 +44,7 @@ def test_turning_happens_while_driving_and_may_take_longer():
     assert pose_at(missions.rules.params[0], robots[0], 0.5)[4] == pytest.approx(0.25)
     yaw = pose_at(missions.rules.params[0], robots[0], 1.0)[3]
     assert (yaw - 3.5) % (2 * math.pi) == pytest.approx(0.0, abs=1e-9)
-    slow = started(free_box(robots=1, robot={"turn_rate_rad_s": 0.1}))
-    put(slow, 0, (1.75, 1.75, 1.25, 0.0, 0.0))
+    slow = standing((1.75, 1.75, 1.25, 0.0, 0.0), robot={"turn_rate_rad_s": 0.1})
     toward(slow, (1.75, 2.75, 1.25, 1.0, 0.0))
     assert slow.state.missions[0]["time_s"] == pytest.approx(10.5)
 
@@ -90,8 +76,7 @@ def test_a_rover_stops_where_the_ground_ends_and_says_so(monkeypatch):
     world = World(Grid((7, 11, 5), 0.5), ground, "step")
     monkeypatch.setattr(episode, "make_world", lambda *_: world)
     rover = {"motion": "planar", "sensor_height_m": 1.75, "above_ground_m": 0.75, "body_radius_m": 0.3}
-    missions = started(free_box(robots=1, robot={**rover, "reach_m": 4.0, "tilts": True}))
-    put(missions, 0, (2.25, 1.25, 1.75, 0.0, 0.0))
+    missions = standing((2.25, 1.25, 1.75, 0.0, 0.0), robot={**rover, "reach_m": 4.0, "tilts": True})
     robots = toward(missions, (2.25, 4.75, 1.75, 0.0, 0.9))
     assert list(MoveEnd)[robots["move_end"][0]] is MoveEnd.EDGE
     assert robots["goal"][0] == pytest.approx([2.25, 2.75, 1.75, 0.0, 0.9])  # voxel 6 touches the edge at 3.5
@@ -102,8 +87,7 @@ def test_a_rover_stops_where_the_ground_ends_and_says_so(monkeypatch):
     robots = toward(missions, (0.75, 2.4, 1.75, 0.0, 0.0))
     assert list(MoveEnd)[robots["move_end"][0]] is MoveEnd.EDGE
     flying = {"motion": "free", "above_ground_m": 0.75, "reach_m": 4.0}
-    missions = started(free_box(robots=1, robot=flying))
-    put(missions, 0, (2.25, 1.25, 1.75, 0.0, 0.0))
+    missions = standing((2.25, 1.25, 1.75, 0.0, 0.0), robot=flying)
     assert list(MoveEnd)[toward(missions, (2.25, 4.75, 1.75, 0.0, 0.0))["move_end"][0]] is MoveEnd.ARRIVED
 
 
@@ -113,8 +97,7 @@ def test_a_robot_stays_between_ground_and_ceiling_and_says_which_of_them_stopped
     ground[:, :, 0] = True
     world = World(Grid((7, 11, 5), 0.5), ground, "plain", ceiling=np.full((7, 11), 4, np.int32))
     monkeypatch.setattr(episode, "make_world", lambda *_: world)
-    missions = started(free_box(robots=1))
-    put(missions, 0, (1.75, 2.75, 1.25, 0.0, 0.0))
+    missions = standing((1.75, 2.75, 1.25, 0.0, 0.0))
     robots = toward(missions, (1.75, 2.75, 2.2, 0.0, 0.0))
     assert list(MoveEnd)[robots["move_end"][0]] is MoveEnd.CEILING
     assert robots["goal"][0, 2] == pytest.approx(1.75)
@@ -128,9 +111,9 @@ def test_a_robot_stays_between_ground_and_ceiling_and_says_which_of_them_stopped
 
 
 def test_a_robot_stops_before_a_teammate_and_before_the_path_that_it_still_drives():
-    missions = started(free_box(robot={"body_radius_m": 0.2}))
-    put(missions, 0, (1.75, 1.25, 1.25, 0.0, 0.0))
-    put(missions, 1, (1.75, 2.75, 1.25, 0.0, 0.0))
+    missions = standing(
+        (1.75, 1.25, 1.25, 0.0, 0.0), (1.75, 2.75, 1.25, 0.0, 0.0), robot={"body_radius_m": 0.2}
+    )
     # Robot 0 chooses first: from y = 1.25 to 1.95; robot 1 then may come to 1.95 + 0.4.
     robots = toward(missions, (1.75, 1.95, 1.25, 0.0, 0.0), (1.75, 1.8, 1.25, 0.0, 0.0))
     assert [list(MoveEnd)[code] for code in robots["move_end"]] == [MoveEnd.ARRIVED, MoveEnd.TEAMMATE]
@@ -139,9 +122,12 @@ def test_a_robot_stops_before_a_teammate_and_before_the_path_that_it_still_drive
 
 
 def test_bodies_of_no_size_block_nobody_and_hide_nothing():
-    missions = started(free_box(robot={"body_radius_m": 0.0}, sensor=ONE_RAY))
-    put(missions, 0, (1.75, 1.25, 1.25, math.pi / 2, 0.0))
-    put(missions, 1, (1.75, 2.25, 1.25, math.pi / 2, 0.0))
+    missions = standing(
+        (1.75, 1.25, 1.25, math.pi / 2, 0.0),
+        (1.75, 2.25, 1.25, math.pi / 2, 0.0),
+        robot={"body_radius_m": 0.0},
+        sensor=ONE_RAY,
+    )
     robots = toward(missions, (1.75, 2.25, 1.25, math.pi / 2, 0.0), (1.75, 2.25, 1.25, math.pi / 2, 0.0))
     wander(missions, 1, 0)
     assert robots["blocked_moves"].tolist()[0] == 0
@@ -201,9 +187,11 @@ def test_actions_of_busy_robots_are_ignored():
 
 
 def test_a_step_of_no_fixed_length_ends_with_the_next_arrival():
-    missions = started(free_box(robot={"turn_rate_rad_s": math.inf, "body_radius_m": 0.0}))
-    put(missions, 0, (1.75, 1.25, 1.25, 0.0, 0.0))
-    put(missions, 1, (0.75, 2.25, 1.25, 0.0, 0.0))
+    missions = standing(
+        (1.75, 1.25, 1.25, 0.0, 0.0),
+        (0.75, 2.25, 1.25, 0.0, 0.0),
+        robot={"turn_rate_rad_s": math.inf, "body_radius_m": 0.0},
+    )
     near, far = (1.75, 1.375, 1.25, 0.0, 0.0), (1.75, 2.25, 1.25, 0.0, 0.0)
     robots = toward(missions, near, far)  # 0.125 m: 2·√0.25 = 1 s; 1 m: 3 s; and 0.5 s each
     assert missions.state.missions[0]["time_s"] == pytest.approx(1.5)
@@ -229,9 +217,9 @@ def test_a_step_of_fixed_length_ends_when_it_should_whoever_drives():
 
 
 def test_what_is_heard_of_a_teammate():
-    missions = started(free_box(robot={"turn_rate_rad_s": math.inf}))
-    put(missions, 0, (1.75, 1.25, 1.25, 0.0, 0.0))
-    put(missions, 1, (0.75, 4.25, 1.25, 0.0, 0.0))
+    missions = standing(
+        (1.75, 1.25, 1.25, 0.0, 0.0), (0.75, 4.25, 1.25, 0.0, 0.0), robot={"turn_rate_rad_s": math.inf}
+    )
     chosen = (1.75, 1.375, 1.25, 0.5, 0.25)
     toward(missions, chosen, (0.75, 4.25, 1.75, 0.0, 0.0))
     heard = view_of(missions, 0, 1).teammates[0]

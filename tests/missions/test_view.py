@@ -11,7 +11,7 @@ import pytest
 from entropy_explore_env import EntropyExploreVectorEnv, parallel_env
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
-from tests.reference.scenes import free_box, put, started, wander
+from tests.reference.scenes import free_box, standing, started, wander
 
 
 def test_a_view_shows_the_robot_s_own_state():
@@ -61,8 +61,7 @@ def test_a_view_before_anything_was_measured_or_heard():
 
 @pytest.mark.parametrize("kind", ["continuous", "discrete"])
 def test_the_action_for_a_viewpoint_goes_there(kind):
-    missions = started(free_box(robots=1, action={"kind": kind}))
-    put(missions, 0, (1.75, 2.75, 1.25, 0.0, 0.0))
+    missions = standing((1.75, 2.75, 1.25, 0.0, 0.0), action={"kind": kind})
     wanted = np.array([2.25, 2.25, 1.25, np.pi / 2, np.pi / 4])
     action = view_of(missions, 0, 0).action_for(wanted)
     boxes, numbers = np.zeros((1, 1, 5)), np.zeros((1, 1), np.int64)

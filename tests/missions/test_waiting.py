@@ -9,9 +9,8 @@ import pytest
 
 from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.robots.motion import MoveEnd
-from tests.missions.test_tick import toward
 from tests.reference import rocha04
-from tests.reference.scenes import build, free_box, put, started, wander
+from tests.reference.scenes import build, free_box, standing, started, toward, wander
 
 HERE, FAR, STAY = (1.75, 2.75, 1.25, 0.0, 0.0), (1.75, 3.7, 1.25, 0.0, 0.0), (1.75, 3.75, 1.25, 0.0, 0.0)
 WAITS = {
@@ -24,9 +23,7 @@ WAITS = {
 
 def behind_a_teammate(**changes):
     """Robot 0 is about to be stopped after half a metre, by robot 1: 2 s, and 0.5 s for the scan."""
-    missions = started(free_box(robot={**WAITS, **changes.pop("robot", {})}, **changes))
-    put(missions, 0, HERE)
-    put(missions, 1, STAY)
+    missions = standing(HERE, STAY, robot={**WAITS, **changes.pop("robot", {})}, **changes)
     return missions
 
 

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from entropy_explore_env.belief.raycast import Crossing, longest_crossing
 from entropy_explore_env.missions.observation.layout import action_count
 from entropy_explore_env.missions.simulation import Missions
+from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import BOX
@@ -108,6 +109,14 @@ def started(scenario: Scenario, seed: int = 0, missions: int = 1) -> Missions:
     return these
 
 
+def standing(*poses: Any, **changes: Any) -> Missions:
+    """Return a mission of the tiny box whose robots stand at poses (x, y, z, yaw, pitch)."""
+    missions = started(free_box(robots=len(poses), **changes))
+    for robot, pose in enumerate(poses):
+        put(missions, robot, pose)
+    return missions
+
+
 def random_actions(missions: Missions, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Continuous and discrete actions of all robots, drawn uniformly."""
     robots, rules = missions.scenario.robots, missions.rules
@@ -124,6 +133,16 @@ def wander(missions: Missions, steps: int, seed: int, after: Callable[[int], Non
         missions.step(*random_actions(missions, rng))
         if after is not None:
             after(step)
+
+
+def toward(missions: Missions, *viewpoints: Any) -> np.ndarray:
+    """Send the robots to viewpoints (x, y, z, yaw, pitch) for one step; their states after it."""
+    views = [view_of(missions, 0, robot) for robot in range(missions.scenario.robots)]
+    boxes = [
+        view.action_for(np.asarray(wanted, float)) for view, wanted in zip(views, viewpoints, strict=True)
+    ]
+    missions.step(np.array([boxes], np.float64), np.zeros((1, len(boxes)), np.int64))
+    return missions.state.robots[0]
 
 
 def put(missions: Missions, robot: int, pose: Any, mission: int = 0) -> None:

@@ -86,25 +86,6 @@ def test_what_remains_runs_from_one_to_nought():
 
 
 @pytest.mark.parametrize("changes", SCENES)
-def test_a_picture_of_each_moment(changes):
-    missions = started(free_box(robots=2, **changes), seed=3)
-    painter, pictures, rng = Painter("rgb_array"), [], np.random.default_rng(0)
-    for _ in range(4):
-        painter.watch(missions)
-        before = [array.tobytes() for array in missions.state]
-        picture = painter.picture(missions)
-        assert picture is not None
-        assert (picture.shape, picture.dtype) == ((480, 640, 3), np.uint8)
-        again = painter.picture(missions)
-        assert again is not picture
-        np.testing.assert_array_equal(picture, again)
-        assert [array.tobytes() for array in missions.state] == before
-        pictures.append(picture)
-        missions.step(*random_actions(missions, rng))
-    assert len({picture.tobytes() for picture in pictures}) == 4
-
-
-@pytest.mark.parametrize("changes", SCENES)
 def test_a_picture_shows_the_first_mission_as_robot_0_knows_it(changes, frames):
     missions = started(free_box(robots=3, **changes), seed=3, missions=2)
     painter = Painter("rgb_array")
@@ -179,11 +160,6 @@ def test_a_painter_forgets_at_a_reset(changes, steps, frames):
     assert [len(path) for path in frames[0].paths_m] == [2, 2]
 
 
-def test_it_can_paint_what_it_has_not_watched():
-    missions = started(free_box(robots=2), seed=3)
-    assert Painter("rgb_array").paint(missions).shape == (480, 640, 3)
-
-
 # --- modes
 
 
@@ -233,12 +209,6 @@ def test_a_human_sees_every_moment_at_once_in_one_window(monkeypatch):
     assert window.closed == 1
     painter.watch(missions)
     assert len(FakeWindow.made) == 2
-
-
-def test_pictures_are_made_only_when_asked_for(frames):
-    missions = started(free_box(robots=2), seed=3)
-    watch(missions, Painter("rgb_array"), 5)
-    assert frames == []
 
 
 def test_modes_are_checked():

@@ -53,11 +53,6 @@ def test_a_recorder_keeps_every_moment_as_it_was():
     assert len(np.unique(series.entropy_bits[:, 0])) > 5
 
 
-def test_one_moment_of_one_robot_has_the_same_axes():
-    series = recorded(0, robots=1)[0].series()
-    assert [each.shape for each in series] == [(1,), (1, 1), (1, 1), (1,), (1,), (1, 1, 3), (1, 1, 5)]
-
-
 def test_a_recorder_follows_the_first_mission_only():
     missions = started(free_box(robots=2), seed=5, missions=3)
     recorder, alone = Recorder(missions), Recorder(started(free_box(robots=2), seed=5))

@@ -9,13 +9,10 @@ import pytest
 
 from entropy_explore_env.missions.state import FROM_WORLD
 from entropy_explore_env.reports.state_digest import state_digest
+from tests.missions.kinds import KINDS
 from tests.reference.scenes import free_box, started
 
-DELAYED = {"robots": 2, "track_truth": True, "channel": {"delay_s": 1.0}}
-PHASED = {"robots": 2, "channel": {"phase_s": 3.0, "repeats": 2}}
 BY_SEEN = {"robots": 2, "ending": {"seen_share": 0.9}}
-UNDER_WAY = {"robots": 2, "robot": {"redecide": 1.0}}
-SUMMARIES = {"robots": 2, "channel": {"content": "summaries", "delay_s": 2.0}}
 
 
 def leaf_arrays(state: object) -> Iterator[np.ndarray]:
@@ -26,9 +23,9 @@ def leaf_arrays(state: object) -> Iterator[np.ndarray]:
         yield from [state[name] for name in state.dtype.names] if state.dtype.names else [state]
 
 
-@pytest.mark.parametrize("changes", [DELAYED, PHASED, UNDER_WAY, BY_SEEN, SUMMARIES])
-def test_a_digest_sees_every_array_and_field(changes):
-    missions = started(free_box(**changes), seed=3, missions=2)
+@pytest.mark.parametrize("scenario", [free_box(**BY_SEEN), *(kind.scenario for kind in KINDS.values())])
+def test_a_digest_sees_every_array_and_field(scenario):
+    missions = started(scenario, seed=3, missions=2)
     before, other = state_digest(missions, 0), state_digest(missions, 1)
     assert before != other
     left_out = [getattr(missions.state, name) for name in FROM_WORLD]

@@ -10,9 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.robots.channel import (
-    BITS_PER_ANNOUNCEMENT,
-    BITS_PER_BATCH,
-    BITS_PER_MEASUREMENT,
     Air,
     Delivery,
     draw_delivery,
@@ -46,12 +43,6 @@ def test_the_selection_fulfils_equation_43_and_is_that_of_the_reference(utility,
     assert chosen == rocha04.select(utility, burst, i_min)
 
 
-@drawn(100)
-@given(st.integers(1, 30), st.integers(0, 35))
-def test_of_equal_measurements_the_first_are_sent(rays, burst):
-    assert select([0.5] * rays, burst, 0.5) == list(range(min(rays, burst)))
-
-
 @drawn(200)
 @given(
     utilities,
@@ -72,14 +63,6 @@ def test_i_min_by_hand():
     assert steered_i_min(0.1, utility, 1, 1.0) == pytest.approx(0.1 * math.exp(0.1))  # four: no more
     assert steered_i_min(3.0, utility, 4, 0.25) == pytest.approx(3.0 * math.exp(-0.1))
     assert steered_i_min(1e-6, -np.ones(5), 4, 1.0) == 1e-6  # nothing measured: not below the least
-
-
-def test_i_min_settles_where_so_many_measurements_reach_it():
-    """Utilities spread evenly from 0 to 1: 16 of 64 reach ¾."""
-    i_min, utility = 3.0, (np.arange(64) + 0.5) / 64
-    for _ in range(400):
-        i_min = steered_i_min(i_min, utility, 32, 0.5)
-    assert i_min == pytest.approx(0.75, abs=0.02)
 
 
 def test_selections_by_hand():
@@ -130,10 +113,6 @@ def test_a_loss_probability_of_1_loses_everything(seed):
     rng = np.array([seed], np.uint64)
     assert all(reached(1.0, 5.0, 1.0, rng) is Delivery.LOST for _ in range(50))
     assert reached(9.0, 5.0, 1.0, rng) is Delivery.OUT_OF_RANGE
-
-
-def test_what_messages_cost():
-    assert (BITS_PER_MEASUREMENT, BITS_PER_BATCH, BITS_PER_ANNOUNCEMENT) == (96, 160, 384)
 
 
 def slow_walls(occupied, start, finish, samples=20_000):

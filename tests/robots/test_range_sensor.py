@@ -91,14 +91,6 @@ def test_rays_point_where_yaw_and_pitch_say(yaw, pitch):
     np.testing.assert_allclose(directions_of(COARSE, yaw, pitch), expected, atol=1e-12)
 
 
-def test_up_is_up_and_left_is_left():
-    directions = directions_of(COARSE, 0.0, 0.0)
-    assert directions[0, 1] < 0.0 < directions[-1, 1]
-    assert directions[-1, 2] < 0.0 < directions[0, 2]
-    down = directions_of(RangeSensor((0.0, 0.0), 0.1), 0.0, math.pi / 4)
-    assert down[0] == pytest.approx([math.sqrt(0.5), 0.0, -math.sqrt(0.5)])
-
-
 @drawn(60)
 @given(
     st.sampled_from(SHAPES),
@@ -284,18 +276,6 @@ def test_a_body_behind_an_obstacle_hides_nothing():
     assert (scan.rays["returned"][0], scan.rays["range_m"][0]) == (Return.FREE, 2.0)
     scan = scan_of(np.zeros(SIZE, np.float32), start, -math.pi / 2, 0.0, one, bodies=bodies)
     assert (scan.rays["returned"][0], scan.rays["range_m"][0]) == (Return.HIT, 0.75)
-
-
-def test_a_ray_without_a_return_makes_what_it_crossed_free():
-    truth, start, _ = scene_with_a_teammate()
-    sensor = RangeSensor((0.0, 0.0), 0.1, max_range_m=2.2)  # 4.4 voxels: up to y = 5.9
-    scan = scan_of(truth, start, math.pi / 2, 0.0, sensor)
-    mean, precision = np.full(SIZE, 0.5, np.float32), np.full(SIZE, 1e-3, np.float32)
-    scan.order[0] = 0
-    fuse_scan(scan, 1, mean.ravel(), precision.ravel())
-    assert (mean[3, 1:6, 2] < 1e-4).all()
-    changed = precision != np.float32(1e-3)
-    assert np.flatnonzero(changed).tolist() == flat_index([(3, y, 2) for y in range(1, 6)], SIZE)
 
 
 def test_range_noise_has_the_asked_standard_deviation_and_leaves_free_rays_alone():

@@ -20,9 +20,8 @@ from entropy_explore_env.viewpoints.expected_localization import (
     growth_of_error,
 )
 from tests.missions.test_landmarks import there_and_back
-from tests.missions.test_tick import toward
 from tests.reference import localization as reference
-from tests.reference.scenes import drawn, free_box, put, seeds, started
+from tests.reference.scenes import drawn, free_box, put, seeds, started, toward
 
 SIZE, EDGE, ORIGIN = (7, 11, 5), 0.5, (1.0, -2.0, 0.5)
 RATES = {

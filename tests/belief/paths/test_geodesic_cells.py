@@ -164,12 +164,6 @@ def test_what_is_refused(change, field):
     np.testing.assert_array_equal(space.half_cost, before)
 
 
-def test_all_impassable_and_free_of_charge():
-    space = new_tessellation((3, 5, 1))
-    tessellate(space, np.zeros((3, 5, 1)), np.array([7]), length_cost=1.0)  # only length costs
-    assert space.costs[0, 0, 0] == pytest.approx(1.0 + math.sqrt(2.0))
-
-
 def path_cost(rates, path, length_cost, by_length):
     """Cost of a path of neighbours, as `slow_costs` counts it; all that lies between two must be passable."""
     total, places = 0.0, [tuple(int(i) for i in np.unravel_index(voxel, rates.shape)) for voxel in path]

@@ -124,26 +124,6 @@ def test_a_wall_with_a_gap():
     assert steps[at - 1] == steps[at] == 1
 
 
-def test_no_path_leads_between_two_corners():
-    covered = np.zeros((3, 4, 1), bool)
-    covered[1, :3] = True
-    assert plan(*known(covered), (0, 2, 0), (2, 2, 0))[0] == pytest.approx(4.0)
-    covered[1, 3] = True
-    covered[1, 0] = False
-    assert plan(*known(covered), (0, 1, 0), (2, 1, 0))[0] == pytest.approx(4.0)
-    diagonal = np.zeros((2, 3, 1), bool)
-    diagonal[0, 1] = diagonal[1, 0] = True
-    assert plan(*known(diagonal), (0, 0, 0), (1, 1, 0)) == (math.inf, pytest.approx(np.zeros((0, 3))))
-
-
-@pytest.mark.parametrize("solid", [(0, 0, 1), (0, 1, 0), (1, 0, 0), (0, 1, 1), (1, 0, 1), (1, 1, 0)])
-def test_a_space_diagonal_passes_six_voxels(solid):
-    covered = np.zeros((2, 2, 2), bool)
-    assert plan(*known(covered), (0, 0, 0), (1, 1, 1))[0] == pytest.approx(SQRT3)
-    covered[solid] = True
-    assert plan(*known(covered), (0, 0, 0), (1, 1, 1))[0] == pytest.approx(1.0 + SQRT2)
-
-
 @pytest.mark.parametrize(
     ("unknown_cost", "cost", "through"),
     [(1.0, 8.0, True), (2.0, 8.0 + 3.0, True), (1.7, 8.0 + 3 * 0.7, True), (2.5, 6 + 4 * SQRT2, False)],
@@ -181,27 +161,12 @@ def octile(shape, voxel):
     return (np.maximum(x, y) + (SQRT2 - 1.0) * np.minimum(x, y))[:, :, None]
 
 
-def test_each_voxel_is_reached_from_the_nearest_source():
-    free = belief_costs(*known(np.zeros(FLAT, bool)), PRIOR)
-    sources = [(0, 1, 0), (8, 1, 0), (0, 1, 0)]
-    found = all_costs(new_search(54), new_lattice(FLAT), free, flat_index(sources, FLAT))
-    np.testing.assert_allclose(found, np.minimum(*(octile(FLAT, source) for source in sources[:2])))
-
-
 def test_start_is_goal():
     mean, precision = known(np.zeros(SIZE, bool))
     cost, path = plan(mean, precision, (1, 2, 3), (1, 2, 3))
     assert cost == 0.0 and path.tolist() == [[1, 2, 3]]
     mean[1, 2, 3] = 1.0
     assert plan(mean, precision, (1, 2, 3), (1, 2, 3))[0] == 0.0
-
-
-def test_a_goal_behind_walls_or_inside_one_is_not_reached():
-    covered = np.zeros(SIZE, bool)
-    covered[3] = True
-    for goal in ((6, 10, 4), (3, 5, 2)):
-        cost, path = plan(*known(covered), (0, 0, 0), goal)
-        assert math.isinf(cost) and path.shape == (0, 3)
 
 
 def test_a_start_inside_a_covered_voxel_may_be_left_and_not_entered_again():

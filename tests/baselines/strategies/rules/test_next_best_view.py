@@ -16,9 +16,8 @@ from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import find_scenario
 from tests.baselines.strategies.rules.scenes import missions_of, play
-from tests.missions.test_tick import toward
 from tests.reference import sujan
-from tests.reference.scenes import started
+from tests.reference.scenes import started, toward
 
 PRIOR = 30.0**-2
 
