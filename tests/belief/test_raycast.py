@@ -42,7 +42,7 @@ def cast(cover, start, direction, length=math.inf, behind=0, hit_at_length=False
     return trace, crossing.entered[:n] / TICKS
 
 
-@drawn(400)
+@drawn(250)
 @given(rays(), seeds, st.sampled_from([0.0, 0.05, 0.3]), st.floats(0.05, 20.0), st.integers(0, 3))
 def test_a_ray_crosses_what_the_reference_says(ray, seed, share, length, behind):
     size, start, direction = ray

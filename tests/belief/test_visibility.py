@@ -145,7 +145,7 @@ def on_a_face(cone, voxel, margin=1e-6):
     return rochami.inside(bigger, voxel) != rochami.inside(smaller, voxel)
 
 
-@drawn(250)
+@drawn(120)
 @given(seeds)
 def test_a_cone_marks_the_voxels_of_the_reference(seed):
     rng = np.random.default_rng(seed)

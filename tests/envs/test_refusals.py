@@ -188,11 +188,6 @@ def test_words_that_are_nearly_right_are_answered_with_the_right_one(asked: Any,
     assert meant is not None or "did you mean" not in str(caught.value)
 
 
-def test_an_option_of_a_reset_that_is_nearly_right_is_answered_with_the_right_one() -> None:
-    with pytest.raises(SettingError, match="did you mean starts"):
-        parallel_env(BOX).reset(seed=0, options={"start": None})
-
-
 @pytest.mark.parametrize(
     "seeds", [[[1], [2, 3]], np.zeros((2, 1), int), np.array(3), b"ab", [1, 2.0], {1: 2}]
 )

@@ -19,6 +19,7 @@ from entropy_explore_env import (
     parallel_env,
 )
 from entropy_explore_env.envs.conformance import leaves, require_same
+from tests.envs.pairwise import pairwise
 from tests.reference.scenes import SMALL
 
 BOX = "box-7x11x5"
@@ -43,9 +44,7 @@ def test_gymnasium_makes_a_robot_that_waits_for_nobody(scenario: str) -> None:
     assert truncated
 
 
-@pytest.mark.parametrize("period", [None, 1.0])
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("scenario", SMALL)
+@pytest.mark.parametrize(("scenario", "kind", "period"), pairwise(SMALL, KINDS, (None, 1.0)))
 def test_plays_the_same_as_a_team_of_one(scenario: str, kind: str, period: float | None) -> None:
     settings = {
         "action": {"kind": kind},

@@ -66,7 +66,7 @@ def under_way(redecide: str | float) -> Scenario:
 
 
 def unsure() -> Scenario:
-    """Return a team that drifts past glass, sights its own landmarks, and loses late summaries."""
+    """Return a team that drifts past glass, sights its own landmarks, loses late summaries, and fails."""
     return free_box(
         robots=3,
         robot={"localization": {**DRIFT, "yaw_rad_per_sqrt_m": 0.05}},
@@ -77,7 +77,8 @@ def unsure() -> Scenario:
             "range_noise_m": 0.02,
         },
         fiducials={"number": 30, "own_number": 4, "own_score": 0.1},
-        channel={**SUMMARIES, "delay_s": 0.4, "loss_probability": 0.2},
+        channel={**SUMMARIES, "delay_s": 0.4, "loss_probability": 0.2, "reach": "line_of_sight"},
+        faults=FAULTS,
         decision_period_s=1.0,
         track_truth=True,
     )
@@ -123,7 +124,7 @@ KINDS = {
         ),
         lambda state: state.estimates["sightings"].any() and state.estimates["error"].all(),
     ),
-    "landmarks and summaries behind glass": Kind(
+    "everything at once": Kind(
         unsure(),
         lambda state: state.landmarks["used"].any() and (state.truth == 2.0).any(),
         (partly_unreadable(),),

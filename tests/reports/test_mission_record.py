@@ -54,14 +54,12 @@ def saved(record: MissionRecord, folder: Path) -> Path:
 @pytest.mark.parametrize(
     "changes",
     [
-        {},
-        {"robots": 1},
-        {"action": {"kind": "discrete"}},
+        {"robots": 1, "action": {"kind": "discrete"}},
         {"track_truth": True, "channel": {"delay_s": 2.0}},
         {"channel": {"content": "summaries", "summary_every_s": 1.0, "delay_s": 2.0}},
     ],
 )
-def test_a_record_comes_back_exactly_and_its_commands_lead_to_the_same_state(changes, tmp_path):
+def test_a_record_comes_back_exactly(changes, tmp_path):
     record, missions = recorded(**changes)
     back = load_record(saved(record, tmp_path))
     for field in dataclasses.fields(MissionRecord):
@@ -71,14 +69,9 @@ def test_a_record_comes_back_exactly_and_its_commands_lead_to_the_same_state(cha
             np.testing.assert_array_equal(written, read)
         else:
             assert written == read and type(written) is type(read)
-    again = started(back.scenario, seed=back.seed)
-    robots, continuous = back.scenario.robots, back.commands.ndim == 3
-    for commands in back.commands:
-        boxes = commands[None].astype(np.float64) if continuous else np.zeros((1, robots, 1))
-        again.step(boxes, np.zeros((1, robots), np.int64) if continuous else commands[None])
-    assert state_digest(again, 0) == back.digest == state_digest(missions, 0)
+    assert back.digest == state_digest(missions, 0)
     assert (back.strategy, back.library, back.seed) == ("chance", VERSION, 5)
-    assert back.commands.dtype == (np.float32 if continuous else np.int64)
+    assert back.commands.dtype == (np.float32 if back.commands.ndim == 3 else np.int64)
 
 
 def test_the_same_mission_gives_the_same_file(tmp_path):

@@ -14,8 +14,6 @@ from entropy_explore_env.reports import rerun_view
 from entropy_explore_env.reports.painting import entropy_share, remaining_share
 from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.reports.rerun_view import RerunView, cone_edges, shared_ends_m
-from entropy_explore_env.settings.changes import with_settings
-from entropy_explore_env.settings.scenarios import ROOM_FURNISHED
 from entropy_explore_env.settings.sensor import RangeSensor
 from tests.reference.scenes import free_box, random_actions, started
 
@@ -203,17 +201,6 @@ def test_large_worlds_are_shown_by_larger_cells(tmp_path, monkeypatch):
         if part.mean() < 0.9:
             expected.add(tuple(np.float32((np.array(cell) + 0.5) * 1.5).tolist()))
     assert places == expected and len(expected) > 4
-
-
-def test_files_stay_small(tmp_path):
-    """What is known of the room is written once it changed, not every time."""
-    pytest.importorskip("rerun")
-    scenario = with_settings(ROOM_FURNISHED, {"decision_period_s": None})
-    recorded(tmp_path / "m.rrd", 150, scenario)
-    assert (tmp_path / "m.rrd").stat().st_size < 4 << 20
-    recording = Recording(tmp_path / "m.rrd")
-    writes = sum(len(rows) for entity, rows in recording.rows.items() if "/entropy/" in entity)
-    assert 50 < writes < 108 * 10
 
 
 def test_what_is_not_finished_is_not_there(tmp_path):

@@ -35,7 +35,7 @@ utilities = st.lists(
 )
 
 
-@drawn(400)
+@drawn(200)
 @given(utilities, st.integers(0, 45), st.sampled_from([0.0, 0.0291, 0.25, 0.3219, 0.6215, 3.0]))
 def test_the_selection_fulfils_equation_43_and_is_that_of_the_reference(utility, burst, i_min):
     chosen = select(utility, burst, i_min)
@@ -43,7 +43,7 @@ def test_the_selection_fulfils_equation_43_and_is_that_of_the_reference(utility,
     assert chosen == rocha04.select(utility, burst, i_min)
 
 
-@drawn(200)
+@drawn(80)
 @given(
     utilities,
     st.integers(1, 45),

@@ -151,7 +151,7 @@ def test_a_voxel_that_a_drive_meets_at_an_edge_only_is_none_to_stop_in():
     assert (driven, end) == (pytest.approx(0.5 * (entered + length)), MoveEnd.OBSTACLE)
 
 
-@drawn(300)
+@drawn(150)
 @given(seeds, st.sampled_from([SIZE, (3, 8, 6), (9, 6, 1)]), st.sampled_from([0.05, 0.2, 0.4]))
 def test_wherever_a_drive_ends_the_body_fits(seed, size, share):
     """Between multiples of a quarter: along faces, through edges and corners, up to the boundary."""
@@ -184,7 +184,7 @@ def clear(start, direction, wanted, begin, finish, touching):
     return distance_to_teammate(start, direction, wanted, begin, finish, touching)
 
 
-@drawn(60)
+@drawn(40)
 @given(seeds, st.booleans(), st.floats(0.1, 1.5))
 def test_the_distance_to_a_teammate_by_brute_force(seed, moving, touching):
     rng = np.random.default_rng(seed)

@@ -208,7 +208,7 @@ def test_a_body_keeps_away_from_walls():
         assert found is end
 
 
-@drawn(150)
+@drawn(80)
 @given(seeds, st.sampled_from([(7, 11, 1), (7, 11, 5)]), st.sampled_from([0.2, 0.3, 0.55]))
 def test_who_knows_the_world_meets_nothing_and_gets_wherever_a_path_leads(seed, shape, radius):
     """Random worlds, known by heart: a plan is driven to its end, through voxels in which the body fits."""

@@ -85,15 +85,6 @@ def situation(rng, added):
     return estimate[0], landmark[0], (here - seen_from)[:2]
 
 
-@pytest.mark.parametrize(("row", "column"), [(0, 1), (1, 3), (2, 3)])
-@pytest.mark.parametrize(("shared", "sound"), [(0.5, True), (1.0, True), (2.0, False)])
-def test_a_covariance_has_no_negative_eigenvalue(row, column, shared, sound):
-    """Of the unit matrix with s at two places across the diagonal: 1 - s, 1, 1 and 1 + s."""
-    matrix = np.eye(4)
-    matrix[row, column] = matrix[column, row] = shared
-    assert is_covariance(matrix, np.eye(4), np.zeros((4, 4))) == sound
-
-
 @drawn(40)
 @given(seeds)
 def test_sighting_a_landmark_again_is_a_filter_with_the_pose_of_then_as_more_state(seed):

@@ -60,7 +60,7 @@ def drawn_rates(size, seed, walls):
 @given(
     st.sampled_from(SHAPES), seeds, st.sampled_from([0.0, 0.3]), st.sampled_from([0.0, 0.7]), st.booleans()
 )
-@drawn(40)
+@drawn(16)
 def test_costs_and_cells_are_those_of_a_slow_dijkstra(size, seed, walls, length_cost, by_length):
     rates, rng = drawn_rates(size, seed, walls)
     if np.isinf(rates).all():

@@ -51,7 +51,7 @@ def in_layer(shape, layer):
     return np.arange(math.prod(shape)).reshape(shape)[:, :, layer].ravel()
 
 
-@drawn(120)
+@drawn(50)
 @given(st.sampled_from(LAYERS), seeds, st.sampled_from([0.0, 0.05, 0.2, 0.4]))
 def test_lengths_are_those_of_dijkstra(place, seed, share):
     shape, layer = place

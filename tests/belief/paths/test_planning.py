@@ -31,7 +31,7 @@ FLAT = (9, 6, 1)
 SQRT2, SQRT3 = math.sqrt(2.0), math.sqrt(3.0)
 
 
-@drawn(60)
+@drawn(30)
 @given(st.sampled_from(SHAPES), seeds, st.sampled_from([0.0, 0.3, 1.0, 2.5]), st.integers(1, 4))
 def test_costs_are_those_of_dijkstra(shape, seed, decades, count):
     rates = random_rates(shape, seed, decades)
@@ -44,7 +44,7 @@ def test_costs_are_those_of_dijkstra(shape, seed, decades, count):
     np.testing.assert_allclose(found.ravel(), each.min(axis=0), rtol=1e-8)
 
 
-@drawn(60)
+@drawn(30)
 @given(st.sampled_from(SHAPES), seeds, st.sampled_from([0.0, 0.3, 1.0, 2.5]))
 def test_paths_to_a_goal_are_those_of_dijkstra_and_their_steps_sum_up(shape, seed, decades):
     rates = random_rates(shape, seed, decades)
@@ -65,7 +65,7 @@ def test_paths_to_a_goal_are_those_of_dijkstra_and_their_steps_sum_up(shape, see
     assert sum(steps) == pytest.approx(expected, rel=1e-8)
 
 
-@drawn(40)
+@drawn(25)
 @given(
     seeds,
     st.sampled_from([SIZE, (9, 8, 6), (12, 9, 1)]),
