@@ -4,33 +4,18 @@ from __future__ import annotations
 
 import importlib.metadata
 import re
-import sys
-from collections.abc import Iterator
-from typing import NamedTuple
+
+from packaging.requirements import Requirement
 
 _OURS = "entropy_explore_env"
 _FOR_DEVELOPERS = ("test", "dev")
 """Extras for developers of the project: left out."""
-_WRITTEN = re.compile(r"([\w.-]+)\s*(?:\[([^]]*)\])?([^;]*)(?:;(.*))?")
-_PIN = re.compile(r"==\s*([\w.]+)$")
-_CLAUSE = re.compile(r"""(\w+)\s*([<>=!]+)\s*["']([^"']*)["']""")
-
-
-class Requirement(NamedTuple):
-    """A package that a distribution needs here, in this version of Python."""
-
-    name: str
-    extras: tuple[str, ...]
-    """Which of the package's own extras are needed."""
-    extra: str | None
-    """The extra of the distribution that needs it; None = it is always needed."""
-    pin: str | None
-    """The only version that does; None = others do, too."""
+_OF_EXTRA = re.compile(r"""\bextra == ["']([^"']+)["']""")
 
 
 def needed() -> list[str]:
     """Return the packages that the library always needs; none where it is not installed."""
-    return [each.name for each in _requirements(_OURS) if each.extra is None]
+    return [each.name for each in _by_extra(_OURS).get(None, [])]
 
 
 def extras() -> dict[str, list[str]]:
@@ -46,21 +31,25 @@ def extras() -> dict[str, list[str]]:
 
 def pins() -> dict[str, dict[str, str]]:
     """Extra of the library → the packages of which it takes one version alone, and this version."""
-    exact = {
-        extra: {each.name: each.pin for each in brought if each.pin is not None}
-        for extra, brought in _brought().items()
-    }
-    return {extra: versions for extra, versions in exact.items() if versions}
+    found: dict[str, dict[str, str]] = {}
+    for extra, brought in _brought().items():
+        for each in brought:
+            for clause in each.specifier:
+                if clause.operator == "==":
+                    found.setdefault(extra, {})[each.name] = clause.version
+    return found
 
 
 def _brought() -> dict[str, list[Requirement]]:
     """Extra of the library → all that it brings."""
     found: dict[str, list[Requirement]] = {}
-    for each in _requirements(_OURS):
-        if each.extra is None or each.extra in _FOR_DEVELOPERS or each.name == _OURS:
-            continue
-        more = (other for other in _requirements(each.name) if other.extra in each.extras)
-        found.setdefault(each.extra, []).extend((each, *more))
+    for extra, listed in _by_extra(_OURS).items():
+        own = [each for each in listed if each.name != _OURS]
+        if extra is not None and extra not in _FOR_DEVELOPERS and own:
+            more = [
+                other for each in own for name in each.extras for other in _by_extra(each.name).get(name, [])
+            ]
+            found[extra] = [*own, *more]
     return found
 
 
@@ -72,34 +61,16 @@ def version_of(name: str) -> str | None:
         return None
 
 
-def _requirements(distribution: str) -> Iterator[Requirement]:
-    """Yield what a distribution needs here; nothing where it is not installed."""
+def _by_extra(distribution: str) -> dict[str | None, list[Requirement]]:
+    """Extra, or None → what a distribution needs for it here; nothing where it is not installed."""
     try:
         lines = importlib.metadata.requires(distribution) or []
     except importlib.metadata.PackageNotFoundError:
-        return
+        return {}
+    found: dict[str | None, list[Requirement]] = {}
     for line in lines:
-        written = _WRITTEN.match(line)
-        clauses = [] if written is None else _CLAUSE.findall(written[4] or "")
-        conditions = [clause for clause in clauses if clause[0] != "extra"]
-        if written is None or not all(_holds(*condition) for condition in conditions):
-            continue
-        extra = next((value for name, _, value in clauses if name == "extra"), None)
-        asked = tuple(word.strip() for word in (written[2] or "").split(",") if word.strip())
-        pin = _PIN.search(written[3].strip())
-        yield Requirement(written[1], asked, extra, None if pin is None else pin[1])
-
-
-def _holds(name: str, compare: str, value: str) -> bool:
-    """Whether a condition on the version of Python holds; others, such as on the system, count as not met."""
-    if name != "python_version":
-        return False
-    here, there = sys.version_info[:2], tuple(int(part) for part in value.split(".")[:2])
-    return {
-        ">=": here >= there,
-        ">": here > there,
-        "<": here < there,
-        "<=": here <= there,
-        "==": here == there,
-        "!=": here != there,
-    }.get(compare, False)
+        requirement, named = Requirement(line), _OF_EXTRA.search(line)
+        extra = None if named is None else named[1]
+        if requirement.marker is None or requirement.marker.evaluate({"extra": extra or ""}):
+            found.setdefault(extra, []).append(requirement)
+    return found

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
-from entropy_explore_env.errors import SettingError, WorldError, one_of
+from entropy_explore_env.errors import SettingError, WorldError, did_you_mean, one_of
 from entropy_explore_env.settings.validation import is_number
 from entropy_explore_env.worlds.files.map_server import RULES
 from entropy_explore_env.worlds.files.process import Format
@@ -52,6 +52,29 @@ WORDS = {"map_rule": RULES, "up": ("y", "z")}
 """Options that are words → those that they may be."""
 
 
+class LoadOptions(TypedDict, total=False):
+    """Options of `load_world`, which describes them, beside its positional ones; None = not given."""
+
+    resolution_m: float | None
+    negate: bool | None
+    occupied_below: float | None
+    free_above: float | None
+    map_rule: str | None
+    elevation_step_m: float | None
+    clearance_m: float | None
+    ceiling_m: float | None
+    fill: bool | None
+    inside: bool | None
+    scale: float | None
+    up: str | None
+    read_limit_s: float | None
+    read_memory_mib: float | None
+
+
+LOAD_OPTIONS = ("voxel_size_m", "height_m", *LoadOptions.__annotations__)
+"""The names of all options of `load_world`."""
+
+
 def format_of(path: Path) -> Format:
     """Return the format of a file.
 
@@ -73,9 +96,12 @@ def check_options(options: dict[str, Any]) -> None:
         options: Of `load_world`; numbers become floats.
 
     Raises:
-        SettingError: One is not allowed, whatever the file.
+        SettingError: One is unknown, or not allowed whatever the file.
     """
     for name, value in options.items():
+        if name not in LOAD_OPTIONS:
+            allowed = "one of the options " + ", ".join(LOAD_OPTIONS) + did_you_mean(name, LOAD_OPTIONS)
+            raise SettingError(name, value, allowed)
         if value is None:
             continue
         if name in ("negate", "fill", "inside"):

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import dataclasses
-import inspect
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache, wraps
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, ParamSpec
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +17,7 @@ from entropy_explore_env.settings.scenarios import find_scenario
 from entropy_explore_env.settings.validation import check_instance, checked_path, is_whole
 from entropy_explore_env.worlds.files.archives import restored, saved
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
-from entropy_explore_env.worlds.files.process import Limits, read_apart
+from entropy_explore_env.worlds.files.process import Format, Limits, read_apart
 from entropy_explore_env.worlds.files.resampling import extruded, resampled
 from entropy_explore_env.worlds.files.voxels import (
     FREE,
@@ -34,6 +32,7 @@ from entropy_explore_env.worlds.formats import (
     IMAGE,
     JACKSBORO_FORMAT,
     OCTOMAP,
+    LoadOptions,
     check_options,
     format_of,
 )
@@ -43,49 +42,15 @@ from entropy_explore_env.worlds.splits import draw_world_number, world_generator
 from entropy_explore_env.worlds.world import World
 from entropy_explore_env.writing import write_atomically
 
-_Given = ParamSpec("_Given")
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
-def _with_known_options(load: Callable[_Given, World]) -> Callable[_Given, World]:
-    """Return a function that loads worlds, whose options that are unknown are refused by name."""
-    known = tuple(inspect.signature(load).parameters)
-
-    @wraps(load)
-    def checked(*args: _Given.args, **options: _Given.kwargs) -> World:
-        _refuse_unknown(options, known)
-        return load(*args, **options)
-
-    return checked
-
-
-def _refuse_unknown(options: Mapping[str, object], known: Sequence[str]) -> None:
-    """Raise a SettingError for the first option that is not known."""
-    for name, value in options.items():
-        if name not in known:
-            allowed = "one of the options " + ", ".join(known) + did_you_mean(name, known)
-            raise SettingError(name, value, allowed)
-
-
-@_with_known_options
 def load_world(
     path: Path | str,
     voxel_size_m: float | None = None,
     height_m: float | None = None,
-    *,
-    resolution_m: float | None = None,
-    negate: bool | None = None,
-    occupied_below: float | None = None,
-    free_above: float | None = None,
-    map_rule: str | None = None,
-    elevation_step_m: float | None = None,
-    clearance_m: float | None = None,
-    ceiling_m: float | None = None,
-    fill: bool | None = None,
-    inside: bool | None = None,
-    scale: float | None = None,
-    up: str | None = None,
-    read_limit_s: float | None = None,
-    read_memory_mib: float | None = None,
+    **options: Unpack[LoadOptions],
 ) -> World:
     """Return the world in a file; its voxels lie in the file's frame, in metres. Unknown space is solid.
 
@@ -134,49 +99,27 @@ def load_world(
         WorldWarning: The file was read in a way that its author may not have meant: of a plan of shades that
             map savers write for unknown, and of margins that were cropped.
     """
-    options = {
-        "voxel_size_m": voxel_size_m,
-        "resolution_m": resolution_m,
-        "negate": negate,
-        "occupied_below": occupied_below,
-        "free_above": free_above,
-        "map_rule": map_rule,
-        "elevation_step_m": elevation_step_m,
-        "clearance_m": clearance_m,
-        "ceiling_m": ceiling_m,
-        "fill": fill,
-        "inside": inside,
-        "scale": scale,
-        "up": up,
-    }
-    check_options(
-        {**options, "height_m": height_m, "read_limit_s": read_limit_s, "read_memory_mib": read_memory_mib}
-    )
-    limits = Limits(read_limit_s, read_memory_mib)
-    path = checked_path("world file", path)
-    if str(path) == JACKSBORO:
-        return _world(read_apart(JACKSBORO_FORMAT, JACKSBORO, options, limits), JACKSBORO, options, height_m)
-    return _world(read_apart(format_of(path), path.absolute(), options, limits), str(path), options, height_m)
+    return _load(path, {"voxel_size_m": voxel_size_m, "height_m": height_m, **options})
 
 
-LOAD_OPTIONS = tuple(inspect.signature(load_world).parameters)[1:]
-"""The names of the options of `load_world`."""
-
-
-@_with_known_options
 def load_octomap(
-    path: Path | str, voxel_size_m: float | None = None, *, read_memory_mib: float | None = None
+    path: Path | str, voxel_size_m: float | None = None, **options: Unpack[LoadOptions]
 ) -> World:
     """Return the world in an OctoMap tree, whatever its suffix; see `load_world`."""
-    check_options({"voxel_size_m": voxel_size_m, "read_memory_mib": read_memory_mib})
-    options = {"voxel_size_m": voxel_size_m}
+    return _load(path, {"voxel_size_m": voxel_size_m, **options}, OCTOMAP)
+
+
+def _load(path: Path | str, options: dict[str, Any], form: Format | None = None) -> World:
+    """Return the world in a file; None = its suffix says the format."""
+    check_options(options)
+    height_m = options.pop("height_m", None)
+    limits = Limits(options.pop("read_limit_s", None), options.pop("read_memory_mib", None))
     path = checked_path("world file", path)
-    return _world(
-        read_apart(OCTOMAP, path.absolute(), options, Limits(None, read_memory_mib)),
-        str(path),
-        options,
-        None,
-    )
+    if form is None and str(path) == JACKSBORO:
+        voxels = read_apart(JACKSBORO_FORMAT, JACKSBORO, options, limits)
+    else:
+        voxels = read_apart(form or format_of(path), path.absolute(), options, limits)
+    return _world(voxels, str(path), options["voxel_size_m"], height_m)
 
 
 def save_world(world: World, path: Path | str) -> None:
@@ -213,16 +156,16 @@ def world_from_bytes(data: bytes) -> World:
     Raises:
         RefusedError: It is no saved world. A broken archive raises whatever zipfile and NumPy raise.
     """
-    return _world(restored(data), "", {"voxel_size_m": None}, None)
+    return _world(restored(data), "", None, None)
 
 
 _NO_SPACE = "a map with free space at this voxel size"
 _SHADES = " (pixels darker than half of white are solid; occupied_below, --occupied-below, sets the limit)"
 
 
-def _world(voxels: Voxels, path: str, options: dict[str, Any], height_m: float | None) -> World:
+def _world(voxels: Voxels, path: str, voxel_size_m: float | None, height_m: float | None) -> World:
     """Return the world of a file's voxels, resampled and extruded."""
-    size_m = options["voxel_size_m"] or voxels.voxel_size_m
+    size_m = voxel_size_m or voxels.voxel_size_m
     try:
         labels, ceiling = resampled(voxels, size_m)
     except RefusedError as error:
@@ -324,12 +267,10 @@ def world_from_file(path: Path | str, voxel_size_m: float, **options: Any) -> Wo
         files = ", ".join(f"*{suffix}" for suffix in FORMATS)
         allowed = f"a recipe ({', '.join(RECIPES)}), a file ({files}) or, to an environment, a World"
         raise SettingError("Scenario.world", str(path), allowed + did_you_mean(str(path), RECIPES))
-    _refuse_unknown(options, LOAD_OPTIONS)
-    size = {"voxel_size_m": voxel_size_m}
+    options["voxel_size_m"] = voxel_size_m
     check_options(options)
-    check_options(size)
     path = path if str(path) == JACKSBORO else path.resolve()
-    return _cached_world(path, _file_version(path), size["voxel_size_m"], tuple(sorted(options.items())))
+    return _cached_world(path, _file_version(path), tuple(sorted(options.items())))
 
 
 def _file_version(path: Path) -> tuple[int, int]:
@@ -342,11 +283,9 @@ def _file_version(path: Path) -> tuple[int, int]:
 
 
 @lru_cache(maxsize=4)
-def _cached_world(
-    path: Path, version: tuple[int, int], voxel_size_m: float, options: tuple[tuple[str, Any], ...]
-) -> World:
+def _cached_world(path: Path, version: tuple[int, int], options: tuple[tuple[str, Any], ...]) -> World:
     del version  # part of the key of the cache
-    return load_world(path, voxel_size_m, **dict(options))
+    return load_world(path, **dict(options))
 
 
 def with_world(scenario: Scenario) -> Scenario:

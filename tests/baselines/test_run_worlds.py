@@ -13,7 +13,7 @@ from baselines.cli.arguments import run_command
 from baselines.cli.world_options import Reading
 from benchmarks.proofs.world_samples import pgm
 from entropy_explore_env.reports.mission_record import load_record
-from entropy_explore_env.worlds.load import LOAD_OPTIONS
+from entropy_explore_env.worlds.formats import LOAD_OPTIONS
 from tests.baselines.ran import SHORT, check_refused
 
 

@@ -34,7 +34,7 @@ from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.sensor import RangeSensor
-from entropy_explore_env.worlds.load import LOAD_OPTIONS
+from entropy_explore_env.worlds.formats import LOAD_OPTIONS
 from tests.envs.bad_values import PARTS, VALUES, Is, fields, hashable, put
 
 BOX = "box-7x11x5"

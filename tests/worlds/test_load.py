@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import math
 import pickle
 import re
@@ -21,7 +20,6 @@ from entropy_explore_env.settings.scenarios import BOX
 from entropy_explore_env.worlds.files.process import kept_reader
 from entropy_explore_env.worlds.formats import FORMATS
 from entropy_explore_env.worlds.load import (
-    LOAD_OPTIONS,
     load_octomap,
     load_world,
     save_world,
@@ -93,16 +91,6 @@ def test_settings_out_of_range_are_refused_before_anything_is_read(setting, valu
 def test_an_option_that_there_is_not_is_refused_with_the_one_that_is_like_it(load):
     with pytest.raises(SettingError, match=r"voxl_size_m = 0\.2: expected.*; did you mean voxel_size_m\?$"):
         load("nowhere.bt", voxl_size_m=0.2)
-
-
-def test_a_misspelt_height_is_a_named_error():
-    with pytest.raises(SettingError, match=r"heigth_m = 2: expected one of .*; did you mean height_m\?$"):
-        load_world("nowhere.png", heigth_m=2)
-
-
-def test_the_options_of_load_world_are_known_to_who_asks_for_its_signature():
-    assert LOAD_OPTIONS == tuple(inspect.signature(load_world).parameters)[1:]
-    assert LOAD_OPTIONS[:2] == ("voxel_size_m", "height_m") and "fill" in LOAD_OPTIONS
 
 
 def test_settings_that_mean_nothing_for_a_file_are_refused(tmp_path):
