@@ -3,10 +3,13 @@
     python -m baselines.benchmark --suite plans --strategies best,mine.py:Mine
     python -m baselines.benchmark --scenarios room,office --robots 1,3 --seeds 10
     python -m baselines.benchmark --world maps/*.yaml --quick --out results/mine
+    python -m baselines.benchmark --suite plans --strategies mine.py:Mine --author "A. Name" --entry mine
+    python -m baselines.benchmark --check mine
 
 Every strategy runs the same missions; mission k of all tasks and strategies comes before any mission k + 1.
 The folder gets a page with a table over all tasks, a figure, and an archive of all missions. An interrupted
 run continues where it was. A mission that raises an error or exceeds its limit is a row with the reason.
+An entry is a folder with the record of every mission, which --check plays again without the strategy.
 """
 
 from __future__ import annotations
@@ -25,8 +28,8 @@ from baselines.cli.options import Mark
 from baselines.cli.task_options import TaskOptions, is_whole_scenario
 from baselines.cli.worker_options import TrialOptions
 from baselines.experiments.rows import read_table
-from baselines.experiments.trials import run_trials
-from baselines.strategies import STRATEGIES, make_strategy, resolved
+from baselines.experiments.trials import How, run_trials
+from baselines.strategies import STRATEGIES, make_strategy, resolved, shown_names
 from baselines.suites import find_suite, suite_strategies
 from baselines.suites.own import (
     DEFAULT_SCENARIOS,
@@ -44,7 +47,17 @@ from entropy_explore_env.settings.validation import check_whole
 _SEEDS, _QUICK_SEEDS = 30, 5
 _PINNED = ("scenarios", "robots", "seeds", "world_scenario")
 """Options that a suite pins, as it does all of a task's."""
-_WHERE = ("--out", "--runs", "--archive", "--jobs", "--cluster", "--json", "--tables", "--stop-after-s")
+_WHERE = (
+    "--out",
+    "--runs",
+    "--archive",
+    "--jobs",
+    "--cluster",
+    "--json",
+    "--tables",
+    "--stop-after-s",
+    "--cite",
+)
 _NOT_TOLD = (*_WHERE, "--rerun", "--since")
 """Options that a page does not tell."""
 
@@ -56,6 +69,7 @@ class Args(TrialOptions):
     usual: ClassVar = (
         *("suite", "scenarios", "world", "strategies", "robots", "seeds", "quick", "settings"),
         *("time_limit_s", "wall_limit_s", "stop_after_s", "jobs", "out", "tables", "json"),
+        *("entry", "author", "check", "cite"),
     )
 
     suite: str | None = None
@@ -92,16 +106,28 @@ class Args(TrialOptions):
     """Folder for the tables that grow while missions run; default: runs in --out."""
     json: bool = False
     """Print one JSON object and nothing else."""
+    entry: Path | None = None
+    """Folder for an entry in the suite: rows and mission records of --strategies, and of no others."""
+    author: str = ""
+    """Who enters."""
+    check: Path | None = None
+    """Folder of an entry, all missions of which are played again and compared with its rows."""
+    cite: Path | None = None
+    """Folder for the table over all tasks as LaTeX and CSV, and the figure as PDF."""
 
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
+    if args.check is not None:
+        return _check(args.check, args)
     suite, refused = _suite(args, words)
     stop_after_s = math.inf if args.stop_after_s is None else args.stop_after_s
     title = "strategies" if args.suite is None else f"suite {suite.name}"
     how = args.how(title, args.json, args.wall_limit_s, keep_failures=True, stop_after_s=stop_after_s)
-    from baselines.suites.page import archive_of, write_page  # matplotlib: after the help
+    if args.entry is not None:
+        return _enter(args.entry, suite, how, args)
+    from baselines.suites.page import archive_of, cite, write_page  # matplotlib: after the help
     from baselines.suites.terminal import printed_results, show_results
 
     if args.archive is not None and not args.archive.is_file():
@@ -126,6 +152,9 @@ def main(words: Sequence[str]) -> int:
         return 0
     command = told_command("python -m baselines.benchmark", words, _NOT_TOLD)
     page = write_page(args.out, results, rows, command, refused)
+    if args.cite is not None:
+        make_folder("cite", args.cite)
+        cite(args.cite, results)
     if args.json:
         wall_s = round(time.monotonic() - started, 1)
         print_json({**printed_results(results), "refused": refused, "wall_s": wall_s})
@@ -136,6 +165,36 @@ def main(words: Sequence[str]) -> int:
         print(f"error: every mission of {', '.join(names)} raised an error", file=sys.stderr)
         return 1
     return 0
+
+
+def _enter(folder: Path, suite: Suite, how: How, args: Args) -> int:
+    """Write an entry."""
+    if args.suite is None or args.strategies is None or not args.author.strip():
+        raise SettingError("entry", str(folder), "--suite, --strategies and --author beside it")
+    from baselines.suites.entries import write_entry
+
+    asked = tuple(dict.fromkeys(map(resolved, args.strategies.split(","))))
+    make_folder("entry", folder)
+    whole = write_entry(folder, dataclasses.replace(suite, strategies=asked), args.quick, args.author, how)
+    print(f"written: {folder}" if whole else f"stopped; the same command goes on with what is in {folder}")
+    return 0
+
+
+def _check(folder: Path, args: Args) -> int:
+    """Check an entry; print which of its rows hold."""
+    from baselines.suites.entries import check_entry
+
+    about, verdicts = check_entry(folder, args.workers)
+    faults = [verdict for verdict in verdicts if verdict.fault]
+    if args.json:
+        print_json({"entry": str(folder), "rows": len(verdicts), "faults": faults})
+    else:
+        entered = ", ".join(shown_names(about.strategies).values())
+        print(f"{entered} in suite {about.suite}, by {about.author}")
+        for cell, seed, fault in faults:
+            print(f"{cell}, seed {seed}: {fault}")
+        print(f"{len(verdicts) - len(faults)} of {len(verdicts)} rows hold")
+    return int(bool(faults))
 
 
 def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:

@@ -16,14 +16,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
-
 from baselines import bag_replay
 from baselines.bag_replay import BagArgs, is_bag, replay_bag
 from baselines.cli.arguments import parse, run_command
 from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
 from baselines.cli.options import Mark
 from baselines.cli.progress import progress_bar
+from baselines.experiments.mission import replay_commands
 from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.mission_record import (
@@ -91,23 +90,13 @@ def _replayed(
     check_world(record, env.missions)
     log.note(env)
     show(env)
-    for commands in record.commands:
-        if not env.agents:
-            break
-        actions = {
-            agent: _action(env, agent, command) for agent, command in zip(env.agents, commands, strict=True)
-        }
-        log.command(actions)
-        env.step(actions)
+
+    def note(env: EntropyExploreEnv) -> None:
         log.note(env)
         show(env)
+
+    replay_commands(env, record, note, log.command)
     return env
-
-
-def _action(env: EntropyExploreEnv, agent: str, command: np.ndarray) -> np.ndarray:
-    """Return a recorded command as the agent's action; what filled it up is cut off."""
-    shape = env.action_space(agent).shape
-    return command[: shape[0]] if shape else command
 
 
 if __name__ == "__main__":

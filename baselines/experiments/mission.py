@@ -20,6 +20,7 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.planner.driver import Driver, Trail
 from entropy_explore_env.reports.metrics import mission_figures
+from entropy_explore_env.reports.mission_record import CommandRecorder, MissionRecord, save_record
 from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.observation import Observation
@@ -240,28 +241,106 @@ class SuiteMission:
 
     start: tuple[float, float, float, float, float] | None = None
 
-    def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
+    @property
+    def options(self) -> dict[str, Any] | None:
+        """Options of the reset."""
+        return None if self.start is None else {"starts": [self.start]}
+
+    def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int, file: Path | None = None) -> Record:
         """Run a mission and keep its figures, and what it cost on the clock.
 
+        Args:
+            env: With any settings.
+            strategy: Name of what chooses the viewpoints.
+            seed: Of the mission.
+            file: For the mission's record; None = it is not kept.
+
         Returns:
-            `mission_figures` with `scans_over_floor`, without those of single robots, rounded; and `clock`:
-            `decision_ms` and `worst_decision_ms`, the time that the strategy took for one robot (median and
-            largest, without compiling and without the first decision, which loads what is compiled), and
-            `mission_s`.
+            `suite_figures`; and `clock`: `decision_ms` and `worst_decision_ms`, the time that the strategy
+            took for one robot (median and largest, without compiling and without the first decision, which
+            loads what is compiled), and `mission_s`.
         """
         timed, started = Stopwatch(make_strategy(strategy), _clock_s), time.perf_counter()
-        options = None if self.start is None else {"starts": [self.start]}
-        run_mission(env, timed, seed, options=options)
+        if file is None:
+            run_mission(env, timed, seed, options=self.options)
+        else:
+            log = _CommandLog()
+            run_mission(env, timed, seed, log.note, log.command, self.options)
+            save_record(log.record(strategy), file)
         mission_s = time.perf_counter() - started
-        figures = mission_figures(env.missions, 0, floor=True)
-        del figures["per_robot"]
         spent_ms = timed.decisions_ms[1:] or timed.decisions_ms
         clock = {
             "decision_ms": float(np.median(spent_ms)),
             "worst_decision_ms": max(spent_ms),
             "mission_s": mission_s,
         }
-        return rounded({**figures, "clock": clock})
+        return {**suite_figures(env), "clock": rounded(clock)}
+
+
+class _CommandLog:
+    """Follows the mission of an environment for its record."""
+
+    def __init__(self) -> None:
+        self._recorder: CommandRecorder | None = None
+
+    def note(self, env: EntropyExploreEnv) -> None:
+        """Note the reset, or a step."""
+        if self._recorder is None:
+            self._recorder = CommandRecorder(env.missions)
+        else:
+            self._recorder.note()
+
+    def command(self, actions: Mapping[str, Any]) -> None:
+        """Note the actions of a step."""
+        assert self._recorder is not None
+        self._recorder.command(actions)
+
+    def record(self, strategy: str) -> MissionRecord:
+        """Return the record of the mission so far."""
+        assert self._recorder is not None
+        return self._recorder.record(strategy)
+
+
+def replay_commands(
+    env: EntropyExploreEnv,
+    record: MissionRecord,
+    after_step: Callable[[EntropyExploreEnv], None] | None = None,
+    before_step: Callable[[Mapping[str, Any]], None] | None = None,
+) -> int:
+    """Give an environment the commands of a record, until they or the mission end.
+
+    Args:
+        env: Just reset, as the record's mission was.
+        record: Whose commands.
+        after_step: Called after every step.
+        before_step: Called with the actions before every step.
+
+    Returns:
+        How many commands were given.
+    """
+    for number, commands in enumerate(record.commands):
+        if not env.agents:
+            return number
+        actions = {}
+        for agent, command in zip(env.agents, commands, strict=True):
+            shape = env.action_space(agent).shape
+            actions[agent] = command[: shape[0]] if shape else command  # what filled it up is cut off
+        if before_step is not None:
+            before_step(actions)
+        env.step(actions)
+        if after_step is not None:
+            after_step(env)
+    return len(record.commands)
+
+
+def suite_figures(env: EntropyExploreEnv) -> Record:
+    """Return what suites keep of the mission that an environment is in: figures of the team, rounded.
+
+    It is `mission_figures` with `scans_over_floor`, without those of single robots.
+    """
+    figures = mission_figures(env.missions, 0, floor=True)
+    del figures["per_robot"]
+    return rounded(figures)
 
 
 def rounded(figures: Any) -> Any:  # noqa: ANN401 - a number, text or object of JSON

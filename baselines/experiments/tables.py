@@ -41,6 +41,12 @@ def terminal_table(head: Sequence[str], rows: Sequence[Sequence[object]], widest
     return tabulate(rows, head, "simple", disable_numparse=True, maxcolwidths=widest, maxheadercolwidths=20)
 
 
+def latex_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """Return a LaTeX tabular, with booktabs' rules; the first column is left-aligned, the others right."""
+    align = ["left", *["right"] * (len(head) - 1)]
+    return tabulate(rows, head, "latex_booktabs", disable_numparse=True, colalign=align) + "\n"
+
+
 def cells_table(
     names: Sequence[str],
     rows: Iterable[tuple[Sequence[object], str]],

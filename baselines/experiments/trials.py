@@ -246,15 +246,18 @@ class CellTrial:
     def run(self) -> Record:
         """Run the mission in this process."""
         try:
-            env = _environment(self.point.scenario, self.point.surroundings)
-            return self.point.record(env, self.point.strategy, self.seed)
+            return self.play(environment(self.point.scenario, self.point.surroundings))
         except BaseException:
-            _environment.cache_clear()  # it stopped in the middle of something
+            environment.cache_clear()  # it stopped in the middle of something
             raise
+
+    def play(self, env: EntropyExploreEnv) -> Record:
+        """Run the mission in an environment."""
+        return self.point.record(env, self.point.strategy, self.seed)
 
 
 @lru_cache(maxsize=1)
-def _environment(scenario: Scenario, surroundings: Surroundings | None) -> EntropyExploreEnv:
+def environment(scenario: Scenario, surroundings: Surroundings | None) -> EntropyExploreEnv:
     """Return an environment, kept for the next mission."""
     return scripted_env(scenario, surroundings)
 
@@ -263,7 +266,7 @@ def _environment(scenario: Scenario, surroundings: Surroundings | None) -> Entro
 def _cell_settings(cell: Cell) -> dict[str, Any]:
     """Return what decides the missions of a cell; rewards change no scripted mission."""
     settings: dict[str, Any] = {
-        "scenario": described(dataclasses.replace(scripted(cell.scenario), reward=Reward())),
+        "scenario": described_scenario(cell),
         "strategy": strategies.resolved(cell.strategy),
         "record": described(cell.record),
     }
@@ -273,6 +276,11 @@ def _cell_settings(cell: Cell) -> dict[str, Any]:
     if outside := _strategy_files(cell.strategy):
         settings["strategy_files"] = [_file_digest(file) for file in outside]
     return settings
+
+
+def described_scenario(cell: Cell) -> dict[str, Any]:
+    """Return the scenario of a cell as rows hold it."""
+    return described(dataclasses.replace(scripted(cell.scenario), reward=Reward()))
 
 
 def described(value: Any) -> Any:  # noqa: ANN401 - whatever a setting may be

@@ -13,14 +13,15 @@ from baselines.experiments.page import Page
 from baselines.experiments.rows import Row as KeptRow
 from baselines.experiments.rows import origins_line, read_table, write_table
 from baselines.experiments.statistics import Interval
-from baselines.experiments.tables import markdown_table
+from baselines.experiments.tables import csv_table, latex_table, markdown_table
 from baselines.strategies import shown_names
-from baselines.suites import SCOREBOARD, find_suite
+from baselines.suites import SCOREBOARD, entries, find_suite
 from baselines.suites.faults import CONDITIONS, LOST_ISOLATED, NOTHING_FAILS, Times, all_claims
 from baselines.suites.figures import fault_figure, task_figure
 from baselines.suites.results import Results, Row, failed_rows, overall_rows, results_of, task_rows
 from baselines.suites.suite import Measure, Task
 from entropy_explore_env.errors import counted
+from entropy_explore_env.writing import write_atomically
 
 _TEMPLATES = Path(__file__).parent
 
@@ -60,6 +61,7 @@ def write_page(
         figures = {each: partial(task_figure, part[0]) for each, part in found.items()}
         tables = {each: partial(overall_table, part[0]) for each, part in found.items()}
         texts |= {"parts": [part_texts(*part) for part in found.values()]}
+        texts["entries"] = entries_table(folder / "scoreboard" / "entries")
     elif name == "faults":
         times = Times(results.suite, results.records)
         claims = all_claims(times)
@@ -93,14 +95,39 @@ def part_texts(results: Results, rows: Sequence[KeptRow]) -> dict[str, Any]:
 
 def overall_table(results: Results) -> str:
     """Return the table over all tasks: a row a strategy, best first."""
+    head, rows = _overall(results)
+    return markdown_table(head, [[f"`{name}`", *cells] for name, *cells in rows])
+
+
+def cite(folder: Path, results: Results) -> None:
+    """Write the table over all tasks as LaTeX and CSV, and the figure of the tasks as PDF."""
+    name, (head, rows) = results.suite.name, _overall(results)
+    plain = [[str(cell).replace("…", "to") for cell in row] for row in rows]
+    latex_head = [text.replace("`", "") for text in head]
+    write_atomically(folder / f"{name}.tex", latex_table(latex_head, plain))
+    overall = overall_rows(results)
+    columns: dict[str, Sequence[object]] = {
+        key: [row[key] for row in overall] for key in ("strategy", "tasks", "missions", "finished")
+    }
+    for measure in results.suite.measures:
+        ratios = [row[f"{measure.name}_ratio"] for row in overall]
+        for part in ("value", "low", "high"):
+            found = [None if ratio is None else getattr(ratio, part) for ratio in ratios]
+            columns[f"{measure.name}_ratio_{part}"] = found
+    write_atomically(folder / f"{name}.csv", csv_table(columns))
+    task_figure(results).savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
+
+
+def _overall(results: Results) -> tuple[list[str], list[list[object]]]:
+    """Return head and rows of the table over all tasks."""
     measures = results.suite.measures
     head = ["strategy", "tasks", "missions", "finished"]
     head += [f"{measure.words}, over `{results.reference}`" for measure in measures]
     overall = overall_rows(results)
     names = shown_names(row["strategy"] for row in overall)
-    rows = [
+    return head, [
         [
-            f"`{names[row['strategy']]}`",
+            names[row["strategy"]],
             row["tasks"],
             row["missions"],
             "-" if row["finished"] is None else f"{row['finished']:.0%}",
@@ -108,7 +135,39 @@ def overall_table(results: Results) -> str:
         ]
         for row in overall
     ]
-    return markdown_table(head, rows)
+
+
+def entries_table(folder: Path) -> str:
+    """Return the table of the entries in a folder, one a row; empty if there are none.
+
+    Ratios are relative to the reference's missions in the archives beside that folder.
+    """
+    rows: list[list[object]] = []
+    for entry in sorted(each.parent for each in folder.glob(f"*/{entries.ABOUT}")):
+        about, check = entries.read_about(entry), entries.read_check(entry)
+        kept = [*read_table(folder.parent / f"{about.suite}.jsonl.xz"), *read_table(entry / entries.ROWS)]
+        results, _ = results_of(find_suite(about.suite, about.quick, about.strategies), kept)
+        checked = "no"
+        if check is not None:
+            checked = f"{check.held} of {check.rows} rows" if check.held < check.rows else "yes"
+        for name, *cells in _overall(results)[1]:
+            if name in shown_names(about.strategies).values():
+                suite = f"{about.suite}, quick" if about.quick else about.suite
+                rows.append(
+                    [f"[`{name}`](scoreboard/entries/{entry.name})", about.author, suite, *cells, checked]
+                )
+    head = [
+        "strategy",
+        "by",
+        "suite",
+        "tasks",
+        "missions",
+        "finished",
+        "first ratio",
+        "second ratio",
+        "checked",
+    ]
+    return markdown_table(head, rows) if rows else ""
 
 
 _TASK_COLUMNS = {

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 from dataclasses import replace
 
@@ -10,7 +12,7 @@ import pytest
 from baselines.experiments.origin import Origin
 from baselines.experiments.rows import Row
 from baselines.experiments.trials import CellTrial
-from baselines.suites.page import shown, write_page
+from baselines.suites.page import cite, shown, write_page
 from baselines.suites.results import Results, failed_rows, overall_rows, results_of, task_rows
 from baselines.suites.suite import PATH, TIME, Place, Suite, Task
 from entropy_explore_env.settings.changes import with_settings
@@ -137,6 +139,17 @@ def test_failures_of_one_reason_share_a_row():
 def test_a_page_where_all_failed_is_a_page(tmp_path):
     page = write_page(tmp_path, results_of_times({"random": [["Oops", "Oops"]]}), [], "the command")
     assert "| `random` | 0 of 2, 2 failed | > 100 |" in page.read_text()
+
+
+def test_a_paper_cites_the_table_as_latex_and_csv_and_the_figure(tmp_path):
+    cite(tmp_path, results_of_times({"random": [[50.0, 40.0]], "quick": [[25.0, 20.0]]}))
+    head, *rows = csv.reader(io.StringIO((tmp_path / "own.csv").read_text()))
+    quick = dict(zip(head, rows[0], strict=True))
+    assert [row[0] for row in rows] == ["quick", "random"]
+    assert [float(quick[f"time_s_end_ratio_{part}"]) for part in ("value", "low", "high")] == [0.5] * 3
+    latex = (tmp_path / "own.tex").read_text()
+    assert latex.startswith("\\begin{tabular}{lrrrrr}") and latex.count("\\\\\n") == 3
+    assert (tmp_path / "own.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_a_figure_without_width_stands_alone():
