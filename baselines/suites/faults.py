@@ -16,13 +16,12 @@ import numpy as np
 from baselines.experiments.claims import Claim
 from baselines.experiments.rows import Record
 from baselines.experiments.statistics import Interval, ratio_interval
-from baselines.suites.suite import QUICK_STARTS, TIME, TIME_90, Place, Records, Suite, Task
+from baselines.suites.results import Results
+from baselines.suites.suite import QUICK_STARTS, Place, Records, Suite, Task
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import SCENARIOS
 
-TITLE = "Teams whose robots and messages fail"
-MEASURES = (TIME, TIME_90)
 STRATEGIES = (
     "planned-rate",
     "mutual-information",
@@ -85,17 +84,17 @@ def tasks(quick: bool = False) -> tuple[Task, ...]:
 
 def later_tasks(suite: Suite, records: Records) -> tuple[Task, ...]:
     """Return the tasks in which the last robot is lost, at a time of its own for each strategy."""
-    times = Times(suite, records)
+    times, missions = Times(Results(suite, records)), max(task.missions for task in suite.tasks)
     found = []
     for name, robots in times.teams:
         for condition, channel in ((LOST, {}), (LOST_ISOLATED, _ALONE)):
             places = []
             for strategy in suite.strategies:
-                whole = times.of(name, robots, strategy, NOTHING_FAILS)
-                if np.isfinite(whole).any():
-                    stop = {"at_s": round(0.5 * float(np.nanmedian(whole)), 1), "robots": (robots - 1,)}
+                whole = list(times.of(name, robots, strategy, NOTHING_FAILS).values())
+                if whole:
+                    stop = {"at_s": round(0.5 * float(np.median(whole)), 1), "robots": (robots - 1,)}
                     scenario = _scenario(name, robots, channel, {"stop": stop})
-                    places.append(Place(strategy, scenario, times.missions, strategy=strategy))
+                    places.append(Place(strategy, scenario, missions, strategy=strategy))
             if places:
                 found.append(Task(task_name(name, robots, condition), tuple(places)))
     return tuple(found)
@@ -118,43 +117,34 @@ def task_name(scenario: str, robots: int, condition: str) -> str:
 
 
 class Times:
-    """Mission times of the suite, by team, strategy and condition."""
+    """Mission times of the suite, by team, strategy and condition.
 
-    def __init__(self, suite: Suite, records: Records) -> None:
-        """Take the records by cell."""
-        self._suite, self._records = suite, records
-        self._tasks = {task.name: task for task in suite.tasks}
-        self.missions = max(task.missions for task in suite.tasks)
-        self.strategies = suite.strategies
-        self.teams = [team for team in TEAMS if self._ran(*team)]
+    Attributes:
+        results: Of the suite.
+        teams: Those that were run.
+    """
 
-    def _ran(self, scenario: str, robots: int) -> bool:
-        return any(self.records(scenario, robots, name, NOTHING_FAILS) for name in self.strategies)
+    def __init__(self, results: Results) -> None:
+        """Take what the missions came to."""
+        self.results, self.strategies = results, results.suite.strategies
+        self._tasks = {task.name: task for task in results.suite.tasks}
+        self.teams = [
+            team for team in TEAMS if any(self.records(*team, n, NOTHING_FAILS) for n in self.strategies)
+        ]
 
     def records(self, scenario: str, robots: int, strategy: str, condition: str) -> dict[int, Record]:
         """Return the records of a cell by seed; none if it was not run."""
         task = self._tasks.get(task_name(scenario, robots, condition))
-        if task is None:
-            return {}
-        cells = [self._suite.cell_id(task, place, strategy) for place in self._suite.places(task, strategy)]
-        return {seed: each for cell in cells for seed, each in self._records.get(cell, {}).items()}
+        return {} if task is None else self.results.numbered(task, strategy)
 
     def all_records(self) -> list[Record]:
         """Return the records of all missions that were run."""
-        return [
-            record
-            for team in self.teams
-            for strategy in self.strategies
-            for condition in CONDITIONS
-            for record in self.records(*team, strategy, condition).values()
-        ]
+        return [record for cell in self.results.records.values() for record in cell.values()]
 
-    def of(self, scenario: str, robots: int, strategy: str, condition: str) -> np.ndarray:
-        """(N,) seconds by seed: the limit of missions that were cut off, NaN of those that have no time."""
-        times_s = np.full(self.missions, math.nan)
-        for seed, record in self.records(scenario, robots, strategy, condition).items():
-            times_s[seed] = record.get("t_mission_s", math.nan)
-        return times_s
+    def of(self, scenario: str, robots: int, strategy: str, condition: str) -> dict[int, float]:
+        """Return seconds by seed: the limit of missions that were cut off, nothing of those that failed."""
+        found = self.records(scenario, robots, strategy, condition).items()
+        return {seed: record["t_mission_s"] for seed, record in found if "t_mission_s" in record}
 
     def cut_off(self, scenario: str, robots: int, strategy: str, condition: str) -> int:
         """Return how many missions of a cell did not come to their end."""
@@ -163,9 +153,9 @@ class Times:
 
     def ratio(self, scenario: str, robots: int, strategy: str, over: str, under: str) -> Interval | None:
         """Return the mean time under one condition over that under another; None without a shared mission."""
-        pair = [self.of(scenario, robots, strategy, condition) for condition in (over, under)]
-        known = np.isfinite(pair[0]) & np.isfinite(pair[1])
-        return ratio_interval(pair[0][known], pair[1][known]) if known.any() else None
+        times = [self.of(scenario, robots, strategy, condition) for condition in (over, under)]
+        shared = sorted(times[0].keys() & times[1].keys())
+        return ratio_interval(*([own[seed] for seed in shared] for own in times)) if shared else None
 
     def told_ratio(self, scenario: str, robots: int, strategy: str, over: str, under: str) -> Interval | None:
         """Return the same; None also where all missions were cut off, since the ratio is 1 by itself."""

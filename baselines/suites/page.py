@@ -63,7 +63,7 @@ def write_page(
         texts |= {"parts": [part_texts(*part) for part in found.values()]}
         texts["entries"] = entries_table(folder / "scoreboard" / "entries")
     elif name == "faults":
-        times = Times(results.suite, results.records)
+        times = Times(results)
         claims = all_claims(times)
         figures = {"faults": partial(fault_figure, times)}
         tables = {"ratios": partial(ratios_table, times), "judged": partial(judged_table, times, claims)}

@@ -144,7 +144,7 @@ class Suite:
     tasks: tuple[Task, ...]
     strategies: tuple[str, ...]
     measures: tuple[Measure, ...] = (TIME, TIME_90)
-    later: Callable[[Suite, Records], tuple[Task, ...]] | None = None
+    later: Later | None = None
 
     def cell_id(self, task: Task, place: Place, strategy: str) -> str:
         """Return the name of a cell of missions."""
@@ -189,6 +189,10 @@ class Suite:
         }
         trials = [CellTrial(cell, seed) for cell in self.cells for seed in range(cell.seeds)]
         return sorted(trials, key=lambda trial: first.get(trial.cell, 0) + trial.seed)
+
+
+Later = Callable[[Suite, Records], tuple[Task, ...]]
+"""Makes tasks that depend on records."""
 
 
 def task_in(name: str, scenario: Scenario, missions: int, **settings: Any) -> Task:  # noqa: ANN401 - settings

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.suites import SCOREBOARD, SUITES, bundled_worlds, find_suite, plans
+from baselines.suites import SCOREBOARD, SUITES, bundled_worlds, find_suite, scoreboard
 from baselines.suites.bundled_worlds import WORLDS
 from baselines.suites.page import about
 from entropy_explore_env import load_world
@@ -83,10 +83,10 @@ def test_the_worlds_are_those_that_they_were():
 def test_plans_replan_at_every_scan_until_everything_is_seen():
     for task in find_suite("plans", False, TEAMS).tasks:
         scenario = task.scenario
-        assert (scenario.robot.redecide, scenario.sensor.scan_every_m) == ("on_scan", plans.SCAN_EVERY_M)
+        assert (scenario.robot.redecide, scenario.sensor.scan_every_m) == ("on_scan", scoreboard.SCAN_EVERY_M)
         assert (scenario.sensor.rays, scenario.sensor.max_range_m) == (720, 8.0)
         if task.name == "dungeons":
-            assert scenario.ending.unseen_free_voxels == plans.DUNGEON_UNSEEN == 250
+            assert scenario.ending.unseen_free_voxels == scoreboard.DUNGEON_UNSEEN == 250
             assert scenario.sensor.max_range_m == 80 * scenario.grid.voxel_size_m
             assert scenario.robot.body_radius_m == 0.0
         else:
