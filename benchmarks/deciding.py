@@ -1,25 +1,22 @@
-"""What exploring costs: decisions of strategies, whole missions, a dense scanner, and kept episodes."""
+"""What exploring costs: decisions of strategies, a mission on a large floor, and a dense scanner."""
 
 from __future__ import annotations
 
-import dataclasses
 import math
-import tempfile
 import time
-from pathlib import Path
 
 import numpy as np
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Stopwatch
+from baselines.suites.bundled_worlds import in_world
 from benchmarks.planning import FLOOR, cluttered
 from benchmarks.rows import Effort, Goal, Row, alone, timed
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import counted
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.settings.observation import Observation
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import CAVE, CLIFF, LAB, OCCLUSIONS, OFFICE, ROOM, find_scenario
 from entropy_explore_env.worlds.world import World
@@ -33,15 +30,21 @@ _LARGE_PLAN = with_settings(
 )
 _LARGE_STEPS = 40
 """Of missions in them: enough for most of what is near to be mapped."""
-_OBSERVED = Observation(panorama_utility="log2", flat=True, while_busy=False)
+_UNDER_WAY = {"robot": {"redecide": "on_scan", "body_radius_m": 0.0}, "sensor": {"scan_every_m": 0.5}}
 PUBLISHED_STEPS_S = 10.0
 """Steps a second measured of a published 2-D exploration environment (ARiADNE's sensor)."""
 _FLOOR_SHARE, _FLOOR_EDGE_M = 0.16, 0.03
 
 
 def deciding_rows(effort: Effort) -> list[Row]:
-    """Return a decision of each strategy that has a limit."""
+    """Return a decision of each strategy that has a limit.
+
+    In the warehouse `planned-rate` decides at every scan under way: by openings until the map has little
+    entropy, and by tours where all has to be seen.
+    """
     steps, few = effort.steps, min(effort.steps, _LARGE_STEPS)
+    warehouse = in_world(OFFICE, "warehouse", _UNDER_WAY)
+    whole = with_settings(warehouse, {"name": "warehouse to be seen whole", "ending": {"seen_share": 1.0}})
     return [
         decision_row(ROOM, 3, "planned-rate", steps, 5.0),
         decision_row(OFFICE, 1, "planned-rate", steps, 10.0),
@@ -49,6 +52,7 @@ def deciding_rows(effort: Effort) -> list[Row]:
         decision_row(LAB, 10, "mutual-information", steps, 5.0),
         decision_row(_LARGE_CLIFF, 1, "cliff-next-best-view", few, 50.0),
         decision_row(_LARGE_PLAN, 1, "next-best-view", few, 50.0),
+        *(decision_row(plan, 1, "planned-rate", steps, 50.0) for plan in (warehouse, whole)),
     ]
 
 
@@ -62,38 +66,9 @@ def decision_row(scenario: Scenario, robots: int, strategy: str, steps: int, mos
     return alone(job, watch.decisions_ms, "ms", Goal("<", most_ms, "ms"))
 
 
-def plan_rows(name: str, path: str, world: World, effort: Effort) -> list[Row]:
-    """Return rows of a mission in a plan's file, with decisions of `planned-rate` at every scan under way.
-
-    It decides by openings until the map has little entropy, and by tours where all has to be seen.
-    """
-    plan = dataclasses.replace(OFFICE, name=name, world=path, grid=world.grid)
-    under_way = {"robot": {"redecide": "on_scan", "body_radius_m": 0.0}, "sensor": {"scan_every_m": 0.5}}
-    whole = {**under_way, "name": f"{name} to be seen whole", "ending": {"seen_share": 1.0}}
-    decisions = [
-        decision_row(with_settings(plan, settings), 1, "planned-rate", effort.steps, 50.0)
-        for settings in (under_way, whole)
-    ]
-    return [*decisions, floor_row(name, world)]
-
-
 def mission_rows(effort: Effort) -> list[Row]:
-    """Return steps with a dense scanner, seconds of missions, and bytes of kept episodes."""
-    rows = [scanner_row(effort)]
-    if effort.large:
-        rows.append(floor_row("a cluttered floor", floor(FLOOR)))
-    rows += [room_row(strategy, effort.long_rounds) for strategy in ("random", "planned-rate")]
-    return [*rows, episodes_row(effort.long_rounds)]
-
-
-def room_row(strategy: str, missions: int) -> Row:
-    """Seconds of missions of three robots in the room; the first one compiles."""
-    env = EntropyExploreEnv(with_settings(scripted(ROOM), {"robots": 3}))
-    seconds = [
-        timed(lambda seed=seed: run_mission(env, make_strategy(strategy), seed)).cpu_s
-        for seed in range(missions + 1)
-    ]
-    return alone(f"a mission of 3 robots in room by {strategy}", seconds[1:], "s")
+    """Return steps with a dense scanner, and a mission on a large floor."""
+    return [scanner_row(effort), *([floor_row("a cluttered floor", floor(FLOOR))] if effort.large else [])]
 
 
 def scanner_row(effort: Effort) -> Row:
@@ -135,17 +110,3 @@ def _floor_s(world: World) -> float:
     scenario = with_settings(scripted(find_scenario("cluttered")), settings)
     env, strategy = EntropyExploreEnv(scenario, world=world), make_strategy("per-time-visibility")
     return timed(lambda: run_mission(env, strategy, 0)).wall_s
-
-
-def episodes_row(missions: int) -> Row:
-    """Bytes a robot-step of missions that are kept as Parquet, by `baselines.episodes`."""
-    from baselines.experiments.mission import Surroundings
-    from baselines.offline.recorded_env import observed_scenario
-    from baselines.offline.shards import Shard
-
-    recorded = observed_scenario(with_settings(ROOM, {"robots": 3}), _OBSERVED)
-    with tempfile.TemporaryDirectory() as folder:
-        shard = Shard(recorded, "planned-rate", Surroundings(), 0, missions, str(Path(folder)))
-        record = shard.run()
-    job = "a robot-step of planned-rate in room as Parquet"
-    return alone(job, [record["bytes"] / (record["rows"] - 3 * missions)], "bytes")

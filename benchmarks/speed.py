@@ -1,7 +1,7 @@
 """Our speed beside peers, in one process and on one thread unless said: `python -m benchmarks.speed`.
 
 Each job and its peer take turns; every figure is a median over the rounds, and every ratio the median of the
-rounds' ratios. Needs the extras `bench`, `episodes` and `training`.
+rounds' ratios. Needs the extras `bench` and `training`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from cpuinfo import get_cpu_info
 
 from baselines.cli.arguments import parse, print_json, run_command
 from baselines.experiments.tables import markdown_table, terminal_table
-from benchmarks.deciding import deciding_rows, mission_rows, plan_rows
+from benchmarks.deciding import deciding_rows, mission_rows
 from benchmarks.fusion import fusion_rows
 from benchmarks.learning import learning_rows
 from benchmarks.peers import load_peers
@@ -30,7 +30,6 @@ from benchmarks.startup import startup_rows
 from benchmarks.stepping import size_rows, step_rows, vector_rows
 from benchmarks.summaries import summary_rows
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.worlds.load import load_world
 from entropy_explore_env.writing import write_atomically
 
 GOAL_MISSED = 1
@@ -42,7 +41,7 @@ JOBS: dict[str, Callable[[Effort], list[Row]]] = {
     "summaries of maps": summary_rows,
     "shortest paths beside SciPy": planning_rows,
     "decisions of strategies": deciding_rows,
-    "missions, a dense scanner, and kept episodes": mission_rows,
+    "a dense scanner, and a mission on a large floor": mission_rows,
     "learning": learning_rows,
     "first steps of fresh processes": startup_rows,
 }
@@ -64,8 +63,6 @@ class Args:
     """Measure no more than what this word is in the title of, such as learning."""
     strict: bool = False
     """Exit with 1 if a goal does not hold."""
-    plan: Path | None = None
-    """A plan's file, such as warehouse.yaml, to explore as well."""
     out: Path | None = None
     """A Markdown file for the table."""
 
@@ -73,7 +70,7 @@ class Args:
 def main(words: Sequence[str]) -> int:
     """Run the command; the exit code."""
     args = parse(Args, words, description=__doc__)
-    jobs, plan = checked(args)
+    jobs = checked(args)
     load_peers()
     if hasattr(os, "getloadavg") and os.getloadavg()[0] > _BUSY:
         print("warning: other work runs here, which makes two threads and starts look slow", file=sys.stderr)
@@ -82,8 +79,6 @@ def main(words: Sequence[str]) -> int:
         print(f"[{number}/{len(jobs)}] {title} …", file=sys.stderr, flush=True)
         effort = QUICK if args.quick else FULL
         rows += job(effort)
-        if job is deciding_rows and args.plan is not None:
-            rows += plan_rows(args.plan.stem, str(args.plan), plan, effort)
     about = {**machine(), "command": " ".join(["python -m benchmarks.speed", *words])}
     if args.out is not None:
         write_atomically(args.out, markdown(about, rows, args.only))
@@ -95,18 +90,18 @@ def main(words: Sequence[str]) -> int:
     return GOAL_MISSED if args.strict and any(row.holds is False for row in rows) else 0
 
 
-def checked(args: Args) -> tuple[dict[str, Callable[[Effort], list[Row]]], Any]:
-    """Return the jobs that are asked for and the plan's world, if any.
+def checked(args: Args) -> dict[str, Callable[[Effort], list[Row]]]:
+    """Return the jobs that are asked for.
 
     Raises:
-        SettingError: No job has such a title, a file or folder is in the way, or the plan cannot be read.
+        SettingError: No job has such a title, or a file or folder is in the way.
     """
     if args.out is not None and (args.out.is_dir() or not args.out.absolute().parent.is_dir()):
         raise SettingError("out", str(args.out), "a file in a folder that exists")
     jobs = {title: job for title, job in JOBS.items() if args.only is None or args.only in title}
     if not jobs:
         raise SettingError("only", args.only, "a word of one of: " + "; ".join(JOBS))
-    return jobs, None if args.plan is None else load_world(args.plan)
+    return jobs
 
 
 def machine() -> dict[str, Any]:

@@ -14,7 +14,7 @@ from types import FrameType
 import numpy as np
 
 from benchmarks.peers import Spread
-from benchmarks.rows import Effort, Goal, Job, Row, Taken, alone, compared, interleave, timed
+from benchmarks.rows import Effort, Goal, Job, Row, Taken, compared, interleave, timed
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.settings.changes import with_settings
@@ -167,9 +167,7 @@ def vector_rows(effort: Effort) -> list[Row]:
     many, few = Batch(max(effort.missions), 1), Batch(16, 1)
     job, calls = f"Python calls in a VectorEnv.step, {many.missions} missions", Goal("=", 1.0)
     rows.append(compared(job, "16 missions", [python_calls(many)], [python_calls(few)], "calls", calls))
-    state = few.env.missions.state
-    size = (state.mean.nbytes + state.precision.nbytes) / state.mean.size
-    return [*rows, alone("belief, a voxel and robot", [size], "bytes", Goal("=", 8.0, "bytes"))]
+    return rows
 
 
 def batch_rows(missions: int, effort: Effort) -> list[Row]:
