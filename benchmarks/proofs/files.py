@@ -12,17 +12,16 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks.proofs.cases import BrokenPromiseError, Found
 from benchmarks.proofs.hostile_worlds import mutant
-from benchmarks.proofs.saved_files import SAVED
+from benchmarks.proofs.saved_files import SAVED, Saved
 from benchmarks.proofs.world_samples import Sample, samples
 from entropy_explore_env.errors import EntropyExploreError, WorldWarning
 from entropy_explore_env.worlds.files.process import CPU_S, ReaderProcess, kept_reader
@@ -64,20 +63,6 @@ _MOST_ERROR = 1000
 """Letters of an error."""
 _IN_MEMORY = "/dev/shm"
 """Folder in memory, where the system has it: to write a file takes longer than to refuse it."""
-
-
-class Files(NamedTuple):
-    """Files of one format.
-
-    Attributes:
-        changed: (number, generator) → what was changed, and the files: name → content.
-        load: Loads those that were changed last from a folder.
-        most_s: Most processor time for it.
-    """
-
-    changed: Callable[[int, np.random.Generator], tuple[str, dict[str, bytes]]]
-    load: Callable[[Path], object]
-    most_s: float
 
 
 @dataclass
@@ -124,7 +109,7 @@ def read_saved(name: str, folder: Path, count: int, seed: int) -> Reads:
     """Change and read records or checkpoints; see `read_changed`."""
     saved = SAVED[name](folder)
     with _little_memory():
-        return read_changed(Files(saved.changed, saved.load, MOST_SAVED_S), folder / "changed", count, seed)
+        return read_changed(saved, folder / "changed", count, seed, MOST_SAVED_S)
 
 
 class Worlds:
@@ -179,23 +164,28 @@ def read_worlds(name: str, folder: Path, count: int, seed: int, reader: ReaderPr
         (inside / "link.pgm").symlink_to(secret)
         (inside / "linked").symlink_to(folder)
     with kept_reader(reader) as kept:
-        worlds = Worlds(_samples()[name])
-        return read_changed(Files(worlds.changed, worlds.load, MOST_S), inside, count, seed, kept)
+        return read_changed(Worlds(_samples()[name]), inside, count, seed, MOST_S, kept)
 
 
 _samples = cache(samples)
 
 
 def read_changed(
-    form: Files, folder: Path, count: int, seed: int, reader: ReaderProcess | None = None
+    form: Saved | Worlds,
+    folder: Path,
+    count: int,
+    seed: int,
+    most_s: float,
+    reader: ReaderProcess | None = None,
 ) -> Reads:
     """Change files, load them, and note what is wrong with how each was treated.
 
     Args:
-        form: Of the files.
+        form: What changes and loads them.
         folder: Where they are written.
         count: Number of changes.
         seed: Of the changes.
+        most_s: Most processor time for a file.
         reader: Process that reads the files; None = this one.
     """
     reads, there = Reads(), dict[str, bytes]()
@@ -208,7 +198,7 @@ def read_changed(
                 (folder / name).write_bytes(content)
                 there[name] = content
         reads.files += 1
-        complaint = _read(form, folder, reader, reads)
+        complaint = _read(form, folder, most_s, reader, reads)
         if complaint:
             reads.wrong.append(f"[{seed}, {number}] {what}: {complaint[:200]}")
     grown_mib = _peak_mib() - before_mib
@@ -219,7 +209,9 @@ def read_changed(
     return reads
 
 
-def _read(form: Files, folder: Path, reader: ReaderProcess | None, reads: Reads) -> str:
+def _read(
+    form: Saved | Worlds, folder: Path, most_s: float, reader: ReaderProcess | None, reads: Reads
+) -> str:
     """Load what lies in a folder; returns what is wrong with how it was treated, or an empty text."""
     earlier_s = reader.cost["cpu_s"] if reader is not None and reader.cost else 0.0
     if reader is not None:
@@ -245,7 +237,7 @@ def _read(form: Files, folder: Path, reader: ReaderProcess | None, reads: Reads)
             complaint = complaint or f"{peak_mib:.0f} MiB"
         reads.most_mib = max(reads.most_mib, peak_mib)
     reads.most_s = max(reads.most_s, spent_s)
-    return complaint or (f"{spent_s:.2f} s" if spent_s > form.most_s else "")
+    return complaint or (f"{spent_s:.2f} s" if spent_s > most_s else "")
 
 
 def _peak_mib() -> float:

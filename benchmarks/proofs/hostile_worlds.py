@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.proofs.changed_bytes import doubled, flipped, overwritten, truncated
+from benchmarks.proofs.saved_files import doubled, flipped, overwritten, truncated
 from benchmarks.proofs.world_samples import Sample, glb_of_json
 
 _SIZES = (b"0", b"-1", b"65536", b"2147483647", b"4294967295", b"99999999999999999999", b"1e308", b"nan")

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.proofs import files
 from benchmarks.proofs.cases import BrokenPromiseError
-from benchmarks.proofs.files import Files, read_changed, read_saved
+from benchmarks.proofs.files import read_changed, read_saved
 from benchmarks.proofs.saved_files import CHANGES, SAVED, another_value
 from entropy_explore_env.errors import EntropyExploreError
 
@@ -53,10 +53,10 @@ def test_an_error_without_a_name_and_a_slow_file_are_found(tmp_path):
     def raises(folder):
         raise KeyError("x")
 
-    changed = SAVED["record"](tmp_path).changed
-    reads = read_changed(Files(changed, raises, 5.0), tmp_path / "changed", 2, 0)
+    saved = SAVED["record"](tmp_path)
+    reads = read_changed(saved._replace(load=raises), tmp_path / "changed", 2, 0, 5.0)
     assert len(reads.wrong) == 2 and "KeyError: 'x'" in reads.wrong[0]
-    reads = read_changed(Files(changed, lambda folder: None, -1.0), tmp_path / "changed", 1, 0)
+    reads = read_changed(saved._replace(load=lambda folder: None), tmp_path / "changed", 1, 0, -1.0)
     assert reads.loaded == 1 and len(reads.wrong) == 1
 
 
