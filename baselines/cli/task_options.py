@@ -17,7 +17,6 @@ from typing import Annotated, Any, Literal, NamedTuple, Protocol, TypeVar
 
 from baselines.cli.arguments import given_values, overlaid
 from baselines.cli.options import Mark
-from baselines.cli.start_options import given_json, reset_options
 from baselines.cli.world_options import Reading, world_settings
 from baselines.experiments.mission import Surroundings
 from entropy_explore_env.command import allow_read_memory
@@ -38,6 +37,7 @@ _WHOLE = ("name", "grid")
 """Settings of a file that is a scenario of its own, and no change of a named one."""
 _WITHIN = ("settings", "scenario")
 """Where mission.json and policy.json hold a scenario."""
+_POSES = "JSON, or a file of it: for each robot [x, y, z, yaw, pitch], or [x, y, yaw] if it is planar"
 
 
 @dataclass
@@ -263,6 +263,56 @@ def worlds_of(options: TaskOptions, files: Sequence[str] | None = None) -> dict[
         allow_read_memory(reading.read_memory_mib)  # of this process: no setting of a mission
         reading = dataclasses.replace(reading, read_memory_mib=None)
     return world_settings(worlds, options.voxel_size_m, reading)
+
+
+def reset_options(starts: str | None, world_number: int | None, scenario: Scenario) -> dict[str, Any]:
+    """Options of `reset` from a command line.
+
+    Args:
+        starts: JSON text (it begins with a bracket), or the path of a file that holds it: a list of A poses,
+            metres and radians in the map frame; None = drawn.
+        world_number: Of the scenario's split; None = drawn.
+        scenario: The task, whose planar robots' poses may be [x, y, yaw].
+
+    Raises:
+        SettingError: The text is no list of poses, or the file cannot be read.
+    """
+    options: dict[str, Any] = {} if world_number is None else {"world": world_number}
+    if starts is not None:
+        poses = given_json("starts", starts, _POSES)
+        if not isinstance(poses, list) or not all(isinstance(pose, list) for pose in poses):
+            raise SettingError("starts", starts, _POSES)
+        options["starts"] = [_full_pose(scenario, robot, pose) for robot, pose in enumerate(poses)]
+    return options
+
+
+def given_json(option: str, given: str, allowed: str) -> Any:  # noqa: ANN401 - whatever the text holds
+    """Return what a text of JSON (it begins with a bracket), or the file of this name, holds.
+
+    Raises:
+        SettingError: It is neither.
+    """
+    text = given
+    if not given.lstrip().startswith("["):
+        try:
+            text = Path(given).expanduser().read_text("utf-8")
+        except (OSError, UnicodeDecodeError):
+            raise SettingError(option, given, allowed) from None
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        raise SettingError(option, given, allowed) from None
+
+
+def _full_pose(scenario: Scenario, robot: int, pose: list[Any]) -> list[Any]:
+    """Return a pose of five numbers; [x, y, yaw] is that of a planar robot in its plane, level."""
+    if len(pose) != 3 or robot >= scenario.robots:
+        return pose
+    plane_m = scenario.plane_m(robot)
+    if plane_m is None:
+        raise SettingError(f"starts[{robot}]", pose, "[x, y, z, yaw, pitch]: this robot flies")
+    x, y, yaw = pose
+    return [x, y, plane_m, yaw, 0.0]
 
 
 def settled(options: TaskOptions) -> TaskOptions:

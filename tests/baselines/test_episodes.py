@@ -20,7 +20,7 @@ pq = pytest.importorskip("pyarrow.parquet", reason="pip install 'entropy_explore
 from baselines.episodes import main  # noqa: E402
 from baselines.offline import shards  # noqa: E402
 from baselines.offline.recorded_env import observed_scenario, recorded_env  # noqa: E402
-from baselines.offline.schema import METADATA, columns  # noqa: E402
+from baselines.offline.shards import METADATA, columns  # noqa: E402
 
 ROOT = Path(__file__).parents[2]
 WORDS = (
