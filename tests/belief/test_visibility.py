@@ -61,20 +61,6 @@ def test_cones_by_hand():
 
 
 @drawn(100)
-@given(seeds, st.floats(0.05, math.pi))
-def test_a_cone_is_a_ball_cut_by_an_angle(seed, half_angle):
-    rng = np.random.default_rng(seed)
-    viewpoint = np.array([*rng.uniform(0, 5, 3), rng.uniform(-math.pi, math.pi), rng.uniform(-1.5, 1.5)])
-    radius, point = rng.uniform(0.5, 5.0), rng.uniform(0, 5, 3)
-    cones = np.array([cone_of(viewpoint, radius, half_angle)])
-    way = point - viewpoint[:3]
-    distance = np.linalg.norm(way)
-    angle = math.acos(np.clip(way @ cones[0]["gaze"] / distance, -1.0, 1.0))
-    if abs(angle - half_angle) > 1e-6 and abs(distance - radius) > 1e-9:
-        assert inside(cones, *point) == (distance < radius and angle < half_angle)
-
-
-@drawn(100)
 @given(seeds, st.floats(0.05, math.pi), st.sampled_from([math.inf, 3.0, 0.4]))
 def test_marks_are_the_voxels_whose_centres_lie_in_a_cone(seed, half_angle, radius):
     rng = np.random.default_rng(seed)

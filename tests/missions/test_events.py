@@ -73,7 +73,7 @@ PHASES_WITHOUT_EVENTS = """
 import numpy as np
 from tests.reference.scenes import free_box, started, wander
 missions = started(free_box(robots=3, channel={"phase_s": 3.0}, decision_period_s=1.0))
-wander(missions, 60, 0)
+wander(missions, 12, 0)
 broadcasts, times = missions.state.phases["broadcasts"][0], missions.state.missions["time_s"][0]
 assert missions.state.robots["deciding"].any()
 print(times, broadcasts)
@@ -81,22 +81,27 @@ for redecide in ("on_scan", 0.3):
     for period_s in (None, 0.7):
         robot, sensor = {"redecide": redecide}, {"scan_every_m": 0.2}
         missions = started(free_box(robot=robot, sensor=sensor, decision_period_s=period_s))
-        wander(missions, 60, 0)
-        assert missions.state.missions["time_s"][0] > 5.0
+        wander(missions, 12, 0)
+        assert missions.state.missions["time_s"][0] > 3.0
 """
 
 
 def test_a_broadcast_is_due_while_all_robots_decide_and_decisions_under_way_are_used_up():
-    """In a process of its own, which can be ended if it hangs; assertions of kernels are compiled in."""
+    """In a process of its own, which can be ended if it hangs; interpreted kernels check themselves."""
     done = subprocess.run(
         [sys.executable, "-c", PHASES_WITHOUT_EVENTS],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "ENTROPY_EXPLORE_ASSERT": "1"},
+        env={
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join(sys.path),
+            "ENTROPY_EXPLORE_ASSERT": "1",
+            "NUMBA_DISABLE_JIT": "1",
+        },
         capture_output=True,
         text=True,
         timeout=120,
         check=True,
     )
-    assert done.stdout.split() == ["60.0", "20"], done.stderr
+    assert done.stdout.split() == ["12.0", "4"], done.stderr
 
 
 def test_every_kind_of_event_counts_as_handled():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import numpy as np
@@ -16,8 +17,10 @@ from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.robots.channel import BITS_PER_BATCH, BITS_PER_COVARIANCE, BITS_PER_MEASUREMENT
+from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.json import scenario_of, settings_of
 from entropy_explore_env.settings.localization import Localization
+from entropy_explore_env.settings.robot_kind import RobotKind
 from tests.reference.scenes import build, drawn, free_box, put, seeds, started, toward, wander
 
 SOME = {
@@ -120,7 +123,11 @@ def test_a_robot_that_is_wrong_about_its_yaw_drives_and_looks_elsewhere():
 def test_a_robot_that_a_fault_stops_is_as_uncertain_as_what_it_has_driven_makes_it():
     """½ m in 1.5 s, then it stops for good; 5 cm per √m."""
     only_xy = {"localization": {"xy_m_per_sqrt_m": 0.05}, "turn_rate_rad_s": math.inf}
-    missions = started(free_box(robots=2, robot=only_xy, faults={"stop": {"at_s": 1.5, "robots": (0,)}}))
+    stops = {"stop": {"at_s": 1.5, "robots": (0,)}}
+    channel = {"content": "summaries", "reach": "line_of_sight"}  # as where all is on: compiled for both
+    missions = started(
+        free_box(robots=2, robot=only_xy, faults=stops, channel=channel, fiducials={"own_number": 1})
+    )
     put(missions, 0, (1.75, 1.75, 1.25, 0.0, 0.0))
     put(missions, 1, STAY)
     for _ in range(5):
@@ -176,10 +183,10 @@ def test_teammates_fuse_in_the_sender_s_frame_with_the_sender_s_covariance(chann
         scenario = free_box(
             robot={"turn_rate_rad_s": math.inf, "localization": SOME, "body_radius_m": 0.0},
             channel={"burst": 100, "i_min_bits": 0.0, "announcements": False, **channel},
-            faults={"blind": {"at_s": 1e-3, "robots": (1,)}},
             decision_period_s=1.0,
         )
-        missions = frozen(scenario)
+        blind = RobotKind(scenario.robot, dataclasses.replace(scenario.sensor, min_range_m=99.0))
+        missions = frozen(with_settings(scenario, {"extra_kinds": (blind,)}))
         put(missions, 0, STAY)
         put(missions, 1, (0.75, 4.75, 1.25, 0.0, 0.0))
         missions.state.estimates["error"][0, 0] = 0.0, 0.5, 0.0, 0.0

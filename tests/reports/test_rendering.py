@@ -17,7 +17,6 @@ from entropy_explore_env.reports.colours import (
     PAPER,
     ROBOT_COLOURS,
     UNKNOWN_COLOUR,
-    robot_colour,
 )
 from entropy_explore_env.reports.page_layout import View, lay_out
 from entropy_explore_env.reports.rendering import Frame, draw_frame
@@ -60,11 +59,6 @@ def part(picture: np.ndarray, box: Box) -> np.ndarray:
     return picture[box.top : box.bottom, box.left : box.right]
 
 
-def part_around(picture: np.ndarray, row: int, column: int, reach: int) -> np.ndarray:
-    """The pixels at most so far from one."""
-    return picture[row - reach : row + reach + 1, column - reach : column + reach + 1]
-
-
 def pixel_of(view: View, voxel: tuple[float, float, float]) -> tuple[int, int]:
     """Row and column of a place in voxels, worked out by hand: x to the right, `up` upwards."""
     column = view.left + voxel[0] / SHAPE[0] * view.width
@@ -95,48 +89,55 @@ def test_picture_has_the_wanted_size_and_maps_their_proportions_and_places(
         assert taken.max() == 1
 
 
-@pytest.mark.parametrize("quantity", ["entropy", "coverage"])
-@pytest.mark.parametrize("up", [1, 2])
-def test_robot_is_drawn_where_it_stands(quantity: str, up: int) -> None:
-    place = (1.5, 8.5, 3.5)
-    frame = frame_of(robots=2)
-    positions = frame.positions_m.copy()
-    positions[1] = ORIGIN_M + np.array(place) * VOXEL_M
-    frame = dataclasses.replace(frame, positions_m=positions)
-    row, column = pixel_of(views_of(frame)[quantity, up], place)
-    assert tuple(draw_frame(frame)[row, column]) == ROBOT_COLOURS[1]
+def metres(*voxels: tuple[float, float, float]) -> np.ndarray:
+    """Return places in the map frame (N, 3) of places in voxels."""
+    return ORIGIN_M + VOXEL_M * np.array(voxels)
 
 
-def test_gaze_points_by_yaw_from_above_and_by_pitch_downwards_from_the_side() -> None:
-    place = (3.5, 5.5, 2.5)
-    frame = frame_of(robots=1)
-    position = (ORIGIN_M + np.array(place) * VOXEL_M)[None]
-    for gaze, up, offset in (
+HERE = (3.5, 5.5, 2.5)
+WAY = [metres((0.5, 9.5, 4.5), (4.5, 9.5, 4.5))]
+DRAWN = [
+    ({"positions_m": metres(HERE)}, HERE, 1, (0, 0), ROBOT_COLOURS[0]),
+    ({"positions_m": metres(HERE)}, HERE, 2, (0, 0), ROBOT_COLOURS[0]),
+    ({"targets_m": metres(HERE)}, HERE, 1, (4, 0), ROBOT_COLOURS[0]),  # a ring
+    ({"targets_m": metres(HERE)}, HERE, 1, (0, -4), ROBOT_COLOURS[0]),
+    ({"targets_m": metres(HERE)}, HERE, 1, (0, 0), None),
+    ({"paths_m": WAY}, (1.0, 9.5, 4.5), 1, (0, 0), ROBOT_COLOURS[0]),
+    ({"paths_m": WAY}, (2.5, 9.5, 4.5), 1, (0, 0), ROBOT_COLOURS[0]),
+    ({"paths_m": WAY}, (4.0, 9.5, 4.5), 2, (0, 0), ROBOT_COLOURS[0]),
+    ({"positions_m": metres(HERE), "stopped": (0,)}, HERE, 2, (0, 0), INK),  # a cross
+    ({"fiducials_m": metres(HERE)}, HERE, 1, (0, 0), PAPER),  # a light triangle
+    ({"fiducials_m": metres(HERE)}, HERE, 2, (0, 0), PAPER),
+    ({"true_m": metres(HERE)}, HERE, 1, (0, 0), PAPER),
+    ({"positions_m": metres(HERE), "true_m": metres(HERE)}, HERE, 1, (0, 0), PAPER),  # it stands out
+]
+
+
+@pytest.mark.parametrize(("changes", "voxel", "up", "offset", "colour"), DRAWN)
+def test_marks_are_drawn_where_they_lie(changes, voxel, up, offset, colour) -> None:
+    """No colour: nothing is drawn there."""
+    plain = frame_of(robots=1)
+    frame = dataclasses.replace(plain, **changes)
+    for quantity in ("entropy", "coverage"):
+        row, column = pixel_of(views_of(frame)[quantity, up], voxel)
+        at = (row + offset[0], column + offset[1])
+        assert tuple(draw_frame(frame)[at]) == (colour or tuple(draw_frame(plain)[at]))
+
+
+@pytest.mark.parametrize(
+    ("gaze", "up", "offset"),
+    [
         ((0.0, 0.0), 1, (0, 9)),
         ((np.pi / 2, 0.0), 1, (-9, 0)),
         ((np.pi, 0.0), 2, (0, -9)),
         ((0.0, np.pi / 2), 2, (9, 0)),
-    ):
-        picture = draw_frame(dataclasses.replace(frame, positions_m=position, gazes_rad=np.array([gaze])))
-        row, column = pixel_of(views_of(frame)["entropy", up], place)
-        assert tuple(picture[row + offset[0], column + offset[1]]) == ROBOT_COLOURS[0]
-        assert tuple(picture[row - offset[0], column - offset[1]]) != ROBOT_COLOURS[0]
-
-
-def test_chosen_viewpoint_is_a_ring_and_the_way_a_line() -> None:
-    target, way = (5.5, 2.5, 1.5), [(0.5, 9.5, 4.5), (4.5, 9.5, 4.5)]
-    frame = dataclasses.replace(
-        frame_of(robots=1),
-        targets_m=(ORIGIN_M + np.array(target) * VOXEL_M)[None],
-        paths_m=[ORIGIN_M + np.array(way) * VOXEL_M],
-    )
-    picture, view = draw_frame(frame), views_of(frame)["entropy", 1]
-    row, column = pixel_of(view, target)
-    assert tuple(picture[row, column]) == tuple(COLOURS["entropy"][255])
-    assert tuple(picture[row + 4, column]) == tuple(picture[row, column - 4]) == ROBOT_COLOURS[0]
-    for x in (1.0, 2.5, 4.0):
-        row, column = pixel_of(view, (x, 9.5, 4.5))
-        assert tuple(picture[row, column]) == ROBOT_COLOURS[0]
+    ],
+)
+def test_gazes_point_by_yaw_from_above_and_by_pitch_downwards_from_the_side(gaze, up, offset) -> None:
+    frame = dataclasses.replace(frame_of(robots=1), positions_m=metres(HERE), gazes_rad=np.array([gaze]))
+    picture, (row, column) = draw_frame(frame), pixel_of(views_of(frame)["entropy", up], HERE)
+    assert tuple(picture[row + offset[0], column + offset[1]]) == ROBOT_COLOURS[0]
+    assert tuple(picture[row - offset[0], column - offset[1]]) != ROBOT_COLOURS[0]
 
 
 def test_one_known_voxel_lights_its_own_rectangle_of_the_coverage_maps() -> None:
@@ -230,6 +231,8 @@ def test_frame_and_picture_name_what_does_not_fit() -> None:
         ("gazes_rad", np.zeros((2, 3))),
         ("curve_share", np.zeros((9, 1))),
         ("paths_m", [np.zeros((1, 3))]),
+        ("covariances_m2", np.zeros((1, 3, 3))),
+        ("fiducials_m", np.zeros((2, 2))),
     ):
         with pytest.raises(SettingError, match=name):
             dataclasses.replace(frame, **{name: value})
@@ -297,19 +300,6 @@ def test_larger_pictures_have_larger_details() -> None:
     assert large.status.height == 2 * small.status.height
 
 
-def test_a_cross_is_drawn_over_a_robot_that_has_stopped():
-    """Beside it nothing changes, and the other robot is drawn as before."""
-    plain = dataclasses.replace(frame_of(), positions_m=np.array([[-1.0, 3.0, 1.25], [0.5, 5.0, 1.25]]))
-    stopped = dataclasses.replace(plain, stopped=(1,))
-    before, after = draw_frame(plain), draw_frame(stopped)
-    changed = np.argwhere((before != after).any(axis=2))
-    view = views_of(plain)["entropy", 2]
-    row, column = pixel_of(view, (5.0, 8.0, 2.0))
-    inside = [p for p in changed if view.top <= p[0] < view.bottom and view.left <= p[1] < view.right]
-    assert inside and all(abs(p[0] - row) <= 10 and abs(p[1] - column) <= 10 for p in inside)
-    assert tuple(after[row, column]) == INK
-
-
 @pytest.mark.parametrize("up", [1, 2])
 def test_an_ellipse_of_two_standard_deviations_is_drawn_around_an_estimate(up: int) -> None:
     """A quarter of a metre along x, half of that upwards: it reaches twice as far."""
@@ -331,39 +321,6 @@ def test_an_ellipse_of_two_standard_deviations_is_drawn_around_an_estimate(up: i
         assert changed[row - 1 : row + 2, column - 1 : column + 2].any()
     row, column = pixel_of(view, place)
     assert not changed[row, column]
-    with pytest.raises(
-        SettingError, match=r"Frame.covariances_m2 = \(2, 3, 3\): expected a shape \(1, 3, 3\)"
-    ):
-        dataclasses.replace(frame, covariances_m2=np.zeros((2, 3, 3)))
-
-
-def test_a_line_leads_from_an_estimate_to_the_mark_of_where_the_robot_is() -> None:
-    """The mark is light, with an edge of the robot's colour, and stands out where the two places are one."""
-    frame = dataclasses.replace(
-        frame_of(robots=1), positions_m=ORIGIN_M[None] + VOXEL_M * np.array([[1.5, 2.5, 2.5]])
-    )
-    drawn = dataclasses.replace(frame, true_m=ORIGIN_M[None] + VOXEL_M * np.array([[5.5, 8.5, 2.5]]))
-    picture, view = draw_frame(drawn), views_of(drawn)["entropy", 1]
-    row, column = pixel_of(view, (4.5, 7.0, 2.5))
-    assert tuple(robot_colour(0)) in map(tuple, part_around(picture, row, column, 2).reshape(-1, 3))
-    row, column = pixel_of(view, (5.5, 8.5, 2.5))
-    assert tuple(picture[row, column]) == PAPER
-    known = draw_frame(dataclasses.replace(frame, true_m=frame.positions_m))
-    row, column = pixel_of(view, (1.5, 2.5, 2.5))
-    assert tuple(known[row, column]) == PAPER and tuple(draw_frame(frame)[row, column]) == robot_colour(0)
-
-
-def test_fiducials_are_light_triangles_in_every_map() -> None:
-    place = (2.5, 4.5, 1.5)
-    frame = frame_of(robots=1)
-    drawn = dataclasses.replace(frame, fiducials_m=(ORIGIN_M + VOXEL_M * np.array(place))[None])
-    before, after = draw_frame(frame), draw_frame(drawn)
-    for view in views_of(drawn).values():
-        row, column = pixel_of(view, place)
-        assert tuple(after[row, column]) == PAPER != tuple(before[row, column])
-        assert INK in map(tuple, part_around(after, row, column, 8).reshape(-1, 3))
-    with pytest.raises(SettingError, match=r"Frame.fiducials_m = \(2, 2\): expected a shape \(2, 3\)"):
-        dataclasses.replace(frame, fiducials_m=np.zeros((2, 2)))
 
 
 def test_the_legend_explains_what_is_marked_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
