@@ -48,8 +48,6 @@ def decode_action(params, actions, pose, continuous, discrete, viewpoint):
     """Turn an action into a viewpoint.
 
     Args:
-        params: PARAMS of the robot.
-        actions: ActionSet.
         pose: (5,) float64, its pose.
         continuous: (N,) float64 action; where a candidate was chosen, (5,) its viewpoint; not read where
             actions are discrete.

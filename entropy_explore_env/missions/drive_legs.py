@@ -25,12 +25,7 @@ def drive_leg(params, collision, robots, index, time_s, crossing):
     """Drive from a robot's last corner straight to its goal, drawn nearer if something is in the way.
 
     Args:
-        params: (A,) PARAMS.
         collision: (V,) float32, a Collision each, for its body.
-        robots: (A,) ROBOT.
-        index: Which robot.
-        time_s: When it departs.
-        crossing: Crossing, scratch space.
 
     Returns:
         (distance, code): driven in grid units, and the code of a MoveEnd.
@@ -66,8 +61,6 @@ def distance_to_tube(params, mate, time_s, line, distance, touching):
 
     Args:
         params: PARAMS of the teammate.
-        mate: ROBOT of the teammate.
-        time_s: When the body departs.
         line: Line of the drive.
         distance: How far it wants to drive, in grid units.
         touching: Sum of the two radii in grid units.

@@ -52,12 +52,8 @@ def start_drive(team, collision, choice, index, time_s, work):
     """Commit a robot to what it chose: how far it will get, why no farther, and when it has scanned.
 
     Args:
-        team: Team.
         collision: (V,) float32, a Collision each, for its body.
         choice: CHOICE of the robot, as it means it; turned into the world where that differs.
-        index: Which robot.
-        time_s: When it departs.
-        work: Workspace.
     """
     params, robots = team.params, team.robots
     own, robot, goal = params[index], robots[index], robots[index].goal
@@ -102,9 +98,7 @@ def leave_path(params, robot, time_s, braking):
     """Give up the rest of a robot's drive, if it is under way, and note how it can come to rest on it.
 
     Args:
-        params: PARAMS of the robot.
         robot: ROBOT; what was counted for the rest of its drive is taken back, and its speed is noted.
-        time_s: Now.
         braking: (W, 3) float64, filled in; see Workspace.
 
     Returns:
@@ -174,8 +168,6 @@ def rest_on_path(params, robot, rests, braking):
     """Let a drive that is too short to come to rest on end where the robot comes to rest on its old path.
 
     Args:
-        params: PARAMS of the robot.
-        robot: ROBOT.
         rests: How many points there are in `braking`.
         braking: As `leave_path` filled it in.
 
@@ -243,9 +235,6 @@ def halt(params, robot, time_s, until_s):
     """Stop a robot at once where it is; its drive and its scan are over, and it decides anew at a time.
 
     Args:
-        params: PARAMS of the robot.
-        robot: ROBOT.
-        time_s: Now.
         until_s: When it decides; inf = never.
     """
     here, left = pose_at(params, robot, time_s), share_left(params, robot, time_s)
@@ -295,13 +284,7 @@ def continue_drive(params, footprint, mean, robot, estimate, time_s, crossing):
     Then the drive ends, or a robot that decides under way does so now; some do so at every such scan.
 
     Args:
-        params: PARAMS of the robot.
         footprint: (B, 3) int64, offsets of the voxels that its body touches.
-        mean: (V,) float32, the robot's expected coverage.
-        robot: Its ROBOT.
-        estimate: ESTIMATE of its pose; None = exact.
-        time_s: When it scanned.
-        crossing: Crossing, scratch space.
     """
     robot.scans_under_way += 1
     plan_scan(params, robot)

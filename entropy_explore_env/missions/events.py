@@ -36,13 +36,6 @@ def next_event(shared, robots, messages, phases, faults):
 
     Of those at one instant robots that stop come first; then messages, in the order of sending; then the
     broadcast of all robots; then robots by number.
-
-    Args:
-        shared: PARAMS of any robot.
-        robots: (A,) ROBOT.
-        messages: (Q,) MESSAGE.
-        phases: PHASES of the mission.
-        faults: TeamFaults, or None.
     """
     slot, due_s = next_message(messages)
     broadcast_s = next_broadcast(shared, phases)

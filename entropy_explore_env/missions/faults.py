@@ -94,8 +94,6 @@ def faults_of(params, states, mission):
 
     Args:
         params: (A,) FAULT_PARAMS, or None.
-        states: (E, A) FAULT.
-        mission: Its number.
     """
     if params is None:  # known while compiling: nothing of the rest is compiled
         return None
@@ -198,10 +196,7 @@ def takes_in(faults, robot, index, time_s, bits):
     """Whether a robot's radio hands over a message that reaches it now; counts what goes wrong.
 
     Args:
-        faults: TeamFaults, or None.
         robot: ROBOT; hears a message that arrives twice a second time.
-        index: Its number.
-        time_s: Now.
         bits: What the message costs.
     """
     if faults is None:  # known while compiling: nothing of the rest is compiled
@@ -234,13 +229,7 @@ def spoil(faults, index, scan, sensor, scene, pose, time_s):
     """Let a scan measure what the robot's sensor measures as it is.
 
     Args:
-        faults: TeamFaults, or None.
-        index: The robot's number.
         scan: Scan as `take_scan` filled it in; changed in place.
-        sensor: SensorModel.
-        scene: Scene.
-        pose: SensorPose.
-        time_s: Now.
     """
     if faults is None:  # known while compiling: nothing of the rest is compiled
         return

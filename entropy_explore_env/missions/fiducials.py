@@ -81,16 +81,7 @@ def _surfaces(scenario: Scenario, world: World) -> tuple[np.ndarray, np.ndarray]
 
 @lean_kernel
 def sight_fiducials(localization, params, index, sensor, scene, pose):
-    """Correct a robot's estimate by the fiducials that it sights in a scan, by number.
-
-    Args:
-        localization: TeamLocalization, or None.
-        params: PARAMS of the robot.
-        index: Its number.
-        sensor: SensorModel of the robot.
-        scene: Scene.
-        pose: SensorPose.
-    """
+    """Correct a robot's estimate by the fiducials that it sights in a scan, by number."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return
     estimate, own = localization.estimates[index], localization.params[index]
@@ -137,8 +128,6 @@ def in_sight(params, sensor, scene, pose, away):
     Args:
         params: LOCALIZATION_PARAMS of the robot.
         sensor: SENSOR_PARAMS of its sensor.
-        scene: Scene.
-        pose: SensorPose.
         away: (x, y, z), from the robot to the landmark, metres.
     """
     x, y, z = away

@@ -30,12 +30,6 @@ def sight_landmarks(localization, params, index, sensor, scene, pose, matrices):
     """Correct a robot's estimate by the landmarks of its own map that it sights in a scan, by number.
 
     Args:
-        localization: TeamLocalization, or None.
-        params: PARAMS of the robot.
-        index: Its number.
-        sensor: SensorModel of the robot.
-        scene: Scene.
-        pose: SensorPose.
         matrices: (2, 4, 4) float64, scratch space; None = robots choose none.
     """
     if localization is None or matrices is None:  # known while compiling: nothing of the rest is compiled
@@ -61,10 +55,6 @@ def choose_landmark(localization, params, index, scene, scan, belief, matrices):
     replaces the worst.
 
     Args:
-        localization: TeamLocalization, or None.
-        params: PARAMS of the robot.
-        index: Its number.
-        scene: Scene.
         scan: Scan, fused into the belief.
         belief: (mean, precision), (V,) float32 each, of the robot.
         matrices: As of `sight_landmarks`.
@@ -125,7 +115,6 @@ def voxel_behind(params, point, direction):
     """Return the number of the voxel in the workspace that begins where a ray has ended.
 
     Args:
-        params: PARAMS of the robot.
         point: (x, y, z) of its end, metres.
         direction: (3,) of the ray.
     """
@@ -148,9 +137,6 @@ def place_landmark(own, estimate, scene, params, ray, landmark):
 
     Args:
         own: LOCALIZATION_PARAMS of the robot.
-        estimate: ESTIMATE.
-        scene: Scene.
-        params: PARAMS of the robot.
         ray: RAY, in the direction that the robot believes.
         landmark: LANDMARK, filled in but for its score.
 

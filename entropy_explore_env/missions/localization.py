@@ -106,10 +106,6 @@ def localization_of(params, estimates, fiducials, landmarks, mission):
 
     Args:
         params: (A,) LOCALIZATION_PARAMS, or None.
-        estimates: (E, A) ESTIMATE.
-        fiducials: (E, F, 3) float64.
-        landmarks: (E, A, L) LANDMARK.
-        mission: Its number.
     """
     if params is None:  # known while compiling: nothing of the rest is compiled
         return None
@@ -118,12 +114,7 @@ def localization_of(params, estimates, fiducials, landmarks, mission):
 
 @lean_kernel
 def estimate_of(localization, index):
-    """ESTIMATE of a robot; None where no robot drifts.
-
-    Args:
-        localization: TeamLocalization, or None.
-        index: The robot's number.
-    """
+    """ESTIMATE of a robot; None where no robot drifts."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return None
     return localization.estimates[index]
@@ -139,11 +130,7 @@ def estimate_in(estimates, mission, index):
 
 @lean_kernel
 def pose_variance(estimate):
-    """(place, yaw): variance of a robot's place, summed over its axes in m², and of its yaw in rad².
-
-    Args:
-        estimate: ESTIMATE, or None = its pose is exact.
-    """
+    """(place, yaw): variance of a robot's place, summed over its axes in m², and of its yaw in rad²."""
     if estimate is None:  # known while compiling: nothing of the rest is compiled
         return 0.0, 0.0
     covariance = estimate.covariance
@@ -155,8 +142,6 @@ def believed_pose(estimate, params, pose):
     """Pose (x, y, z, yaw, pitch), in the workspace, at which a robot that is at a true one believes to be.
 
     Args:
-        estimate: ESTIMATE, or None.
-        params: PARAMS of the robot.
         pose: Of the robot, in the world.
     """
     if estimate is None:  # known while compiling: nothing of the rest is compiled
@@ -194,15 +179,7 @@ def into_workspace(params, axis, number):
 
 @lean_kernel
 def note_motion(localization, params, robot, index, time_s):
-    """Carry a robot's estimate on to where it is at an event.
-
-    Args:
-        localization: TeamLocalization, or None.
-        params: PARAMS of the robot.
-        robot: Its ROBOT.
-        index: Its number.
-        time_s: Of the event.
-    """
+    """Carry a robot's estimate on to where it is at an event."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return
     estimate = localization.estimates[index]
@@ -227,11 +204,8 @@ def choice_into_world(estimate, params, robot, choice, time_s):
     """Turn what a robot chose, where it believes to be, into a drive through the world from where it is.
 
     Args:
-        estimate: ESTIMATE, or None.
-        params: PARAMS of the robot.
         robot: ROBOT, before it departs; its target becomes the viewpoint as the robot means it.
         choice: CHOICE, changed in place.
-        time_s: When it departs.
     """
     copy_numbers(choice.viewpoint, robot.target, 5)
     if estimate is None:  # known while compiling: nothing of the rest is compiled
@@ -259,11 +233,8 @@ def believe_scan(localization, index, scan, sensor, scene, pose):
     """Let a scan be what its robot takes it for: measured from where it believes to be, and less precise.
 
     Args:
-        localization: TeamLocalization, or None.
-        index: The robot's number.
         scan: Scan as it was taken in the world; its rays are turned, and their voxels those of the belief.
         sensor: SENSOR_PARAMS of the robot.
-        scene: Scene.
         pose: (x, y, z), where the robot believes to be, in grid units.
     """
     if localization is None:  # known while compiling: nothing of the rest is compiled
@@ -285,8 +256,6 @@ def note_scan_pose(localization, index, pose):
     """Keep where a robot believes to have scanned, and count how wrong it was.
 
     Args:
-        localization: TeamLocalization, or None.
-        index: The robot's number.
         pose: (x, y, z, yaw, pitch), where it believes to have been.
     """
     if localization is None:  # known while compiling: nothing of the rest is compiled
@@ -317,10 +286,7 @@ def note_covariance(localization, index, covariances, slot):
     """Put the covariance of a robot's latest scan beside a batch of its measurements, if batches have one.
 
     Args:
-        localization: TeamLocalization, or None.
-        index: The robot's number.
         covariances: (Q, 10) float64, of batches; changed in place.
-        slot: Of the batch.
     """
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return
@@ -332,12 +298,8 @@ def weigh_batch(localization, covariances, slot, scan, count, voxel_size_m):
     """Lower the precision of a batch's measurements by the covariance beside it, if batches have one.
 
     Args:
-        localization: TeamLocalization, or None.
         covariances: (Q, 10) float64, of batches.
-        slot: Of the batch.
         scan: Scan that its measurements were unpacked into.
-        count: How many there are.
-        voxel_size_m: Edge of a voxel.
     """
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return

@@ -50,14 +50,7 @@ def plan_missions(planning, navigator, kind, braking, continuous, discrete, firs
     """Plan the paths of the robots of one kind that decide, each through its own belief.
 
     Args:
-        planning: Planning.
         navigator: Working space for this kind, not shared with another thread.
-        kind: Its number.
-        braking: Of the Workspace.
-        continuous: (E, A, N) float64 actions.
-        discrete: (E, A) int64 actions.
-        first: The first mission.
-        last: One past the last.
     """
     for mission in range(first, last):
         clock = planning.missions[mission]

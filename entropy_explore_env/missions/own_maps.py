@@ -38,13 +38,7 @@ class TeamSummaries(NamedTuple):
 
 @lean_kernel
 def summaries_of(tree, state, mission):
-    """TeamSummaries of a mission; None where robots send no summaries.
-
-    Args:
-        tree: Tree, scratch memory; or None.
-        state: MissionState.
-        mission: Its number.
-    """
+    """TeamSummaries of a mission; None where robots send no summaries."""
     if tree is None:  # known while compiling: nothing of the rest is compiled
         return None
     return TeamSummaries(
@@ -62,10 +56,7 @@ def note_measured(summaries, index, scan, size):
     """Fuse a robot's scan, as it takes it for, into its own map.
 
     Args:
-        summaries: TeamSummaries, or None.
-        index: The robot's number.
         scan: Scan with crossings and precisions filled in.
-        size: (X, Y, Z) voxels.
     """
     if summaries is None:  # known while compiling: nothing of the rest is compiled
         return

@@ -89,17 +89,7 @@ def weigh_collected(localization, voxel_size_m, buffers, index, side, place, sca
 
 @lean_kernel
 def broadcast_all(team, maps, buffers, phases, time_s, tracer, scan):
-    """All robots broadcast, by number; where a phase ends their buffers change places before.
-
-    Args:
-        team: Team.
-        maps: Maps.
-        buffers: PhaseBuffers.
-        phases: PHASES of the mission.
-        time_s: When.
-        tracer: Tracer.
-        scan: Scan, scratch space.
-    """
+    """All robots broadcast, by number; where a phase ends their buffers change places before."""
     repeats, robots = team.params[0].repeats, len(team.robots)
     if phases.broadcasts % repeats == repeats - 1:
         phases.collecting = 1 - phases.collecting
@@ -119,14 +109,7 @@ def broadcast(team, maps, buffers, side, index, time_s, tracer, scan):
     """Send a robot's buffer; teammates that do not have it yet fuse it.
 
     Args:
-        team: Team.
-        maps: Maps.
-        buffers: PhaseBuffers.
         side: Which of its two buffers.
-        index: The robot.
-        time_s: When.
-        tracer: Tracer.
-        scan: Scan, scratch space.
     """
     robots, robot, params = team.robots, team.robots[index], team.params
     batches, heard = buffers.counts[index, side], buffers.heard[index]

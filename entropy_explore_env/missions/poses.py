@@ -138,9 +138,6 @@ def driven_metres(params, missions, robots, out):
     """Fill (E, A): metres that robots have driven up to now; `distance_m` counts a drive when it begins.
 
     Args:
-        params: (A,) PARAMS.
-        missions: (E,) MISSION.
-        robots: (E, A) ROBOT.
         out: (E, A) float64.
     """
     for mission in range(robots.shape[0]):

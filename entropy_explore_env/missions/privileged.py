@@ -78,9 +78,6 @@ def _fill_mates(params, missions, robots, diagonal, nearest, soonest):
     """Fill (E, A) with the nearest teammate's distance and the soonest decision of one, scaled.
 
     Args:
-        params: (A,) PARAMS.
-        missions: (E,) MISSION.
-        robots: (E, A) ROBOT.
         diagonal: Of the workspace, metres.
         nearest: (E, A) float32, filled in.
         soonest: (E, A) float32, filled in.

@@ -156,12 +156,8 @@ def propose_missions(proposing, proposer, kind, offsets, first, last, out):
     """Propose candidates to the robots of one kind that decide, and write the parts of their observations.
 
     Args:
-        proposing: Proposing.
         proposer: Proposer of this kind, not shared with another thread.
-        kind: Its number.
         offsets: CandidateOffsets.
-        first: The first mission.
-        last: One past the last.
         out: (E, A, F) float32, of which those parts are filled in: with zeros for robots that do not decide.
     """
     state, knowledge = proposing.state, proposer.scratch.knowledge[0]

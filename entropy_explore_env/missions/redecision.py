@@ -67,13 +67,6 @@ def decide(params, actions, robot, estimate, time_s, continuous, discrete, choic
     """Write what a robot that decides has chosen, as if it began a drive from where it believes to be.
 
     Args:
-        params: PARAMS of the robot.
-        actions: ActionSet.
-        robot: ROBOT.
-        estimate: ESTIMATE of its pose; None = exact.
-        time_s: Now.
-        continuous: (N,) float64 action.
-        discrete: Number of the action.
         choice: CHOICE, filled in as for a straight drive.
     """
     copy_numbers(robot.goal, choice.pose, 5)
@@ -91,10 +84,7 @@ def note_change(params, robot, choice, braking):
     """Find out whether what a robot chose changes its drive.
 
     Args:
-        params: PARAMS of the robot.
-        robot: ROBOT.
         choice: CHOICE; `changed` is filled in.
-        braking: Of the Workspace.
     """
     if braking is None:  # known while compiling: nothing of the rest is compiled
         return
@@ -142,12 +132,7 @@ def note_braking(params, robot, estimate, time_s, choice, braking):
     """Find out whether a robot under way has to come to rest before the path that it chose.
 
     Args:
-        params: PARAMS of the robot.
-        robot: ROBOT.
-        estimate: ESTIMATE of its pose; None = exact.
-        time_s: Now.
         choice: CHOICE; `brakes` and `start` are filled in.
-        braking: Of the Workspace.
     """
     if braking is None:  # known while compiling: nothing of the rest is compiled
         return

@@ -34,14 +34,7 @@ _NOTHING = int(Return.NOTHING)
 
 @lean_kernel
 def scan_and_share(mission, sensor, index, work):
-    """Let a robot measure from where it is, fuse, and send what is most useful.
-
-    Args:
-        mission: Mission, changed in place.
-        sensor: SensorModel of the robot.
-        index: Its number.
-        work: Workspace.
-    """
+    """Let a robot measure from where it is, fuse, and send what is most useful."""
     clock, team = mission.clock, mission.team
     params, robot = team.params[index], team.robots[index]
     scan = first_rays(work.scan, params.rays)

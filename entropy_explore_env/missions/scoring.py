@@ -34,13 +34,7 @@ def note_progress(clock, robots):
 
 @lean_kernel
 def note_seen(params, clock, robots):
-    """Take time and driven path when the team has seen each of SEEN_MARKS of what can be seen.
-
-    Args:
-        params: (A,) PARAMS.
-        clock: MISSION, changed in place.
-        robots: (A,) ROBOT.
-    """
+    """Take time and driven path when the team has seen each of SEEN_MARKS of what can be seen."""
     for mark in range(len(SEEN_MARKS)):
         enough = clock.explored_visible >= SEEN_MARKS[mark] * clock.visible - _ROUNDING
         if enough and clock.seen_s[mark] < 0.0:
@@ -57,8 +51,6 @@ def note_idle(clock, robots, idle):
     """Count a scan that showed nothing new of what can be seen; begin anew after one that did.
 
     Args:
-        clock: MISSION, changed in place.
-        robots: (A,) ROBOT.
         idle: Whether the scan showed nothing new.
     """
     if idle:
@@ -84,9 +76,7 @@ def holds_enough(clock, visible, truth, precision, prior_precision):
     It counts all voxels: for missions whose joint map holds enough already.
 
     Args:
-        clock: MISSION.
         visible: (V,) bool, what can be seen.
-        truth: (V,) float32.
         precision: (V,) float32 of the robot's belief.
         prior_precision: 1/σ² of a voxel that it neither measured nor was told of.
     """
@@ -103,9 +93,6 @@ def score_scan(clock, joint, truth, scan, prior_precision):
     """Fuse a scan into the joint map, and carry its entropy, coverage and errors (see MISSION).
 
     Args:
-        clock: MISSION, changed in place.
-        joint: JointMap, changed in place.
-        truth: (V,) float32.
         scan: Scan with crossings and precisions filled in.
         prior_precision: 1/σ² of a voxel that was never measured.
     """

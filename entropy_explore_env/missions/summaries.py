@@ -38,15 +38,6 @@ _BITS_PER_BYTE = 8
 def share_summary(summaries, team, maps, clock, in_flight, index, recipients):
     """Send a summary of what a robot measured itself, if it is time for one.
 
-    Args:
-        summaries: TeamSummaries, or None.
-        team: Team.
-        maps: Maps.
-        clock: MISSION.
-        in_flight: InFlight.
-        index: The robot, which has just scanned.
-        recipients: (A,) bool, scratch space.
-
     Returns:
         Whether robots send summaries, and no batches.
     """
@@ -80,14 +71,7 @@ def send_summary(summaries, team, maps, clock, in_flight, index, length, recipie
     """Broadcast the summary that was written, which teammates fuse at once or after the delay.
 
     Args:
-        summaries: TeamSummaries.
-        team: Team.
-        maps: Maps.
-        clock: MISSION.
-        in_flight: InFlight.
-        index: The sender.
         length: Bytes of the summary.
-        recipients: (A,) bool, scratch space.
     """
     robot, time_s = team.robots[index], clock.time_s
     delay_s = team.params[0].delay_s + draw_lateness(team.faults, index)
@@ -111,12 +95,8 @@ def note_summary(team, recipients, sender, pose, sent_s, time_s, bits):
     """Count a summary with the robots that take it in, and note where its sender was.
 
     Args:
-        team: Team.
         recipients: (A,) bool, which robots it reaches; in place, which take it in.
-        sender: Its number.
         pose: (x, y, z, yaw, pitch), where the sender believed to be.
-        sent_s: When.
-        time_s: Now.
         bits: What it costs.
     """
     for mate in range(len(team.robots)):
@@ -148,13 +128,6 @@ def pack_summary(summaries, slot, index, robots, length):
 @lean_kernel
 def receive_summary(summaries, team, maps, in_flight, slot):
     """Deliver a delayed summary: its recipients fuse it; its slot is free again.
-
-    Args:
-        summaries: TeamSummaries, or None.
-        team: Team.
-        maps: Maps.
-        in_flight: InFlight.
-        slot: Of the message.
 
     Returns:
         Whether the message was one; if not, nothing has changed.
@@ -197,7 +170,6 @@ def precision_of_place(packed, voxel_size_m):
 
     Args:
         packed: (10,) float64, see `robots.localization.pack_covariance`.
-        voxel_size_m: Edge of a voxel.
     """
     off = packed[0] + packed[4] + packed[7]
     return voxel_size_m * voxel_size_m / off if off > 0.0 else math.inf
@@ -209,8 +181,6 @@ def hear_summary(tree, team, maps, recipients, length, most):
 
     Args:
         tree: Tree, the summary in its data.
-        team: Team.
-        maps: Maps.
         recipients: (A,) bool, which robots hear it.
         length: Bytes of the summary.
         most: Most precision that a leaf has.
@@ -234,10 +204,6 @@ def fuse_leaf(tree, shared, maps, index, known):
     """Fuse the leaf that was read last into a robot's belief; returns the bits that it brings.
 
     Args:
-        tree: Tree.
-        shared: PARAMS of any robot.
-        maps: Maps.
-        index: The robot.
         known: float32, precision that the leaf counts with.
     """
     walk, leaf, bits, shrink = tree.walk[0], tree.leaf[0], 0.0, 1.0

@@ -70,14 +70,7 @@ def step_missions(rules, state, choices, work, continuous, discrete, first, last
     """Advance the missions `first` … `last` - 1 by one step; those that are over stand still.
 
     Args:
-        rules: Rules.
-        state: MissionState of E missions, changed in place.
         choices: (E, A) CHOICE, scratch space; those of robots that plan are filled in.
-        work: Workspace, not shared with another thread.
-        continuous: (E, A, N) float64 actions.
-        discrete: (E, A) int64 actions.
-        first: The first mission.
-        last: One past the last.
     """
     masks = rules.params[0].bodies
     for m in range(first, last):
@@ -131,17 +124,7 @@ def air_of(crossing, truth):
 
 @lean_kernel
 def choose(team, clock, actions, continuous, discrete, choices, braking):
-    """Begin to count the step, and fill in the choices that were not planned before it.
-
-    Args:
-        team: Team.
-        clock: MISSION.
-        actions: ActionSet.
-        continuous: (A, N) float64 actions.
-        discrete: (A,) int64 actions.
-        choices: (A,) CHOICE.
-        braking: Of the Workspace.
-    """
+    """Begin to count the step, and fill in the choices that were not planned before it."""
     for index in range(len(team.robots)):
         robot, own = team.robots[index], team.params[index]
         robot.own_bits = 0.0
@@ -160,12 +143,7 @@ def depart(team, clock, in_flight, collision, choices, work):
     Robots under way that keep their viewpoint drive on.
 
     Args:
-        team: Team.
-        clock: MISSION.
-        in_flight: InFlight.
         collision: (N, V) float32 collision masks of this mission.
-        choices: (A,) CHOICE.
-        work: Workspace.
     """
     for index in range(len(team.robots)):
         robot, own = team.robots[index], team.params[index]
@@ -190,13 +168,7 @@ def finish_step(team, clock, before_s):
 
 @lean_kernel
 def advance(mission, sensors, work):
-    """Process the events up to the end of the step, the time limit or the mission's end.
-
-    Args:
-        mission: Mission, changed in place.
-        sensors: TeamSensors.
-        work: Workspace.
-    """
+    """Process the events up to the end of the step, the time limit or the mission's end."""
     clock, team, maps, scan = mission.clock, mission.team, mission.maps, work.scan
     params, robots, tracer = team.params, team.robots, Tracer(sensors.params, mission.truth)
     shared, messages = params[0], mission.in_flight.messages
@@ -249,14 +221,7 @@ def advance(mission, sensors, work):
 
 @lean_kernel
 def scan_at(mission, sensors, index, work):
-    """Let a robot scan at the mission's time, and then stop, drive on, or end its drive.
-
-    Args:
-        mission: Mission, changed in place.
-        sensors: TeamSensors.
-        index: The robot's number.
-        work: Workspace.
-    """
+    """Let a robot scan at the mission's time, and then stop, drive on, or end its drive."""
     time_s, params, own = mission.clock.time_s, mission.team.params[index], mission.team.robots[index]
     localization = mission.team.localization
     note_motion(localization, params, own, index, time_s)

@@ -20,10 +20,6 @@ def write_mask(params, actions, start, mean, out):
     level, for more than one of the gazes of a yaw.
 
     Args:
-        params: PARAMS of the robot.
-        actions: ActionSet.
-        start: (x, y, z), the robot in grid units.
-        mean: (V,) float32, its expected coverage.
         out: (K·D,) filled with 0 and 1.
     """
     gazes = len(actions.gazes)
@@ -45,16 +41,7 @@ def write_mask(params, actions, start, mean, out):
 
 @lean_kernel
 def observe_mask(begin, params, actions, start, mean, row):
-    """Fill (K·D,): the mask as part of an observation.
-
-    Args:
-        begin: Where the part begins in `row`; None = it is left out.
-        params: PARAMS of the robot.
-        actions: ActionSet.
-        start: (x, y, z), the robot in grid units.
-        mean: (V,) float32, its expected coverage.
-        row: (F,) float32, the whole observation; the part is filled in.
-    """
+    """Fill (K·D,): the mask as part of an observation."""
     if begin is None:  # known while compiling: nothing of the rest is compiled
         return
     write_mask(params, actions, start, mean, row[begin:])
@@ -65,12 +52,6 @@ def mask_missions(params, actions, missions, robots, estimates, mean, out):
     """Fill (E, A, N) int8, the masks of all robots' discrete actions.
 
     Args:
-        params: (A,) PARAMS.
-        actions: ActionSet.
-        missions: (E,) MISSION.
-        robots: (E, A) ROBOT.
-        estimates: (E, A) ESTIMATE; None = all robots know where they are.
-        mean: (E, A, V) float32.
         out: Filled in.
     """
     for mission in range(out.shape[0]):

@@ -64,11 +64,6 @@ def observe_robot(rules, offsets, robot, known, crossing, out):
     """Fill the flat observation of one robot.
 
     Args:
-        rules: Rules.
-        offsets: PartOffsets.
-        robot: The robot's number.
-        known: Known of the robot.
-        crossing: Crossing, scratch space.
         out: (F,) float32, filled in.
     """
     params, sensor = rules.params[robot], rules.sensors.params[robot]
@@ -87,12 +82,6 @@ def observe_missions(rules, offsets, observed, crossing, first, last, out):
     """Fill the flat observations of missions' robots, each from where it is now.
 
     Args:
-        rules: Rules.
-        offsets: PartOffsets.
-        observed: Observed.
-        crossing: Crossing, scratch space.
-        first: The first mission.
-        last: One past the last.
         out: (E, A, F) float32, filled in.
     """
     for mission in range(first, last):

@@ -12,10 +12,7 @@ def observe_overview(begin, cells, sums, row):
     """Fill (2·C,): normalised entropy and expected coverage, averaged over each of the Cells.
 
     Args:
-        begin: Where the part begins in `row`; None = it is left out.
-        cells: Cells.
         sums: (2, C) float64 over them.
-        row: (F,) float32, the whole observation; the part is filled in.
     """
     if begin is None:  # known while compiling: nothing of the rest is compiled
         return

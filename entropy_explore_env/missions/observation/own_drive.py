@@ -10,14 +10,7 @@ DRIVE_VALUES = 8
 
 @lean_kernel
 def observe_drive(begin, params, known, row):
-    """Fill (8,): speed as a share of the top speed, and the viewpoint that the robot chose last.
-
-    Args:
-        begin: Where the part begins in `row`; None = it is left out.
-        params: PARAMS of the robot.
-        known: Known of the robot.
-        row: (F,) float32, the whole observation; the part is filled in.
-    """
+    """Fill (8,): speed as a share of the top speed, and the viewpoint that the robot chose last."""
     if begin is None:  # known while compiling: nothing of the rest is compiled
         return
     out = row[begin:]

@@ -15,11 +15,7 @@ def observe_self(begin, params, kinds, known, row):
     """Fill (10 + K,): the robot's pose, the time, the entropy left, whether it decides, and its kind.
 
     Args:
-        begin: Where the part begins in `row`; None = it is left out.
-        params: PARAMS of the robot.
         kinds: K; 0 if all robots are alike.
-        known: Known of the robot.
-        row: (F,) float32, the whole observation; the part is filled in.
     """
     if begin is None:  # known while compiling: nothing of the rest is compiled
         return

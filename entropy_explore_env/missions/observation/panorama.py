@@ -16,14 +16,8 @@ def observe_panorama(begin, params, sensor, directions, start, known, crossing, 
     """Fill (2·D,): what rays around the robot would bring, cast like a scan through its own belief.
 
     Args:
-        begin: Where the part begins in `row`; None = it is left out.
-        params: PARAMS of the robot.
         sensor: SENSOR_PARAMS of the robot.
         directions: (D, 3) float64 unit vectors.
-        start: (x, y, z), the robot in grid units.
-        known: Known of the robot.
-        crossing: Crossing, scratch space.
-        row: (F,) float32, the whole observation; the part is filled in.
     """
     if begin is None:  # known while compiling: nothing of the rest is compiled
         return

@@ -19,13 +19,7 @@ def observe_patch(begin, params, shape, robot, start, known, row):
     """Fill (4·x·y·z,): the belief around the robot's voxel; outside the workspace it is covered.
 
     Args:
-        begin: Where the part begins in `row`; None = it is left out.
-        params: PARAMS of the robot.
         shape: (x, y, z) voxels of the patch.
-        robot: Its number.
-        start: (x, y, z), the robot in grid units.
-        known: Known of the robot.
-        row: (F,) float32, the whole observation; the part is filled in.
     """
     if begin is None:  # known while compiling: nothing of the rest is compiled
         return

@@ -13,15 +13,7 @@ _HALF_LIFE_S = 60.0
 
 @lean_kernel
 def observe_team(begin, params, robot, known, row):
-    """Fill ((A-1)·19,): where teammates were last heard, and what they announced.
-
-    Args:
-        begin: Where the part begins in `row`; None = it is left out.
-        params: PARAMS of the robot.
-        robot: Its number.
-        known: Known of the robot.
-        row: (F,) float32, the whole observation; the part is filled in.
-    """
+    """Fill ((A-1)·19,): where teammates were last heard, and what they announced."""
     if begin is None:  # known while compiling: nothing of the rest is compiled
         return
     out = row[begin:]
