@@ -14,16 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
-from entropy_explore_env.robots.range_coder import (
-    CODER,
-    Coder,
-    read_bit,
-    read_byte,
-    read_change,
-    write_bit,
-    write_byte,
-    write_change,
-)
+from entropy_explore_env.robots.range_coder import CODER, Coder, code_bit, code_byte, code_change
 
 _EMPTY, _LEAF, _SPLIT, _SPLIT_KNOWN = 0, 1, 2, 3
 """Kinds of regions: nothing measured; one leaf; cut; cut, and all of it was measured."""
@@ -63,7 +54,7 @@ WALK = record_type(
         ("sigma", "i8"),
         ("same_mean", "i8"),  # whether that leaf had the mean of the one before it
         ("same_sigma", "i8"),
-        ("nodes", "i8"),  # read so far
+        ("nodes", "i8"),  # visited so far
         ("leaves", "i8"),
     ]
 )
@@ -93,7 +84,7 @@ class Tree(NamedTuple):
     levels: np.ndarray
     """(V,) uint8 grey level of each voxel; not used for reading, and may be empty then."""
     leaf: np.ndarray
-    """(1,) LEAF, that was read last."""
+    """(1,) LEAF, the latest one."""
 
 
 class Region(NamedTuple):
@@ -189,13 +180,6 @@ def size_context(walk, voxels):
     return 4 * bits + walk.kind
 
 
-@inlined_kernel
-def mean_context(walk):
-    """Return the context of the question whether a leaf's mean is that of the leaf before it."""
-    extreme = 1 if walk.mean == 0 else (2 if walk.mean == _MEANS else 0)
-    return _ASKS_MEAN + 2 * extreme + walk.same_mean
-
-
 @lean_kernel
 def write_tree(tree, mean, precision, threshold_bits):
     """Cut a map into leaves, and write the tree.
@@ -206,25 +190,78 @@ def write_tree(tree, mean, precision, threshold_bits):
         precision: (V,) float32, 1/σ² ≥ 0, of what is to be sent; looked at in the walk's box only.
         threshold_bits: Most information content of a leaf.
     """
-    walk, stack, coder = tree.walk[0], tree.stack, tree.coder
-    fill_levels(walk, mean, precision, tree.levels)
+    fill_levels(tree.walk[0], mean, precision, tree.levels)
+    while next_leaf(tree, threshold_bits):
+        code_mean, code_sigma = leaf_codes(tree, mean, precision)
+        code_leaf(tree, code_mean, code_sigma)
+
+
+@lean_kernel
+def read_leaf(tree):
+    """Read on to the next leaf, which is in `tree.leaf` then; returns whether there is one.
+
+    Any data lead to some tree of the map: that is what a checksum is for.
+
+    Args:
+        tree: Tree, its walk begun, its coder reading.
+    """
+    if not next_leaf(tree, 0.0):
+        return False
+    code_leaf(tree, 0, 0)
+    walk, leaf = tree.walk[0], tree.leaf[0]
+    told = _FINEST * 2.0 ** (walk.sigma / _STEPS)
+    leaf.mean, leaf.precision = np.float32(walk.mean / _MEANS), np.float32(_SLACK / (told * told))
+    return True
+
+
+@lean_kernel
+def next_leaf(tree, threshold_bits):
+    """Write or read nodes up to the next leaf, whose region is in `tree.leaf` then; whether there is one."""
+    walk, stack, coder, leaf = tree.walk[0], tree.stack, tree.coder, tree.leaf[0]
     while walk.depth > 0:
         walk.depth -= 1
         region, known = top(stack, walk.depth), stack[walk.depth, 6]
-        voxels = voxels_of(region)
-        kind = kind_of(tree, region, known == 1, threshold_bits)
-        context = size_context(walk, voxels)
-        if known == 0:
-            write_bit(coder, _ASKS_EMPTY + context, int(kind != _EMPTY))
-        if kind != _EMPTY and voxels > 1:
-            write_bit(coder, _ASKS_LEAF + known * _SIZES + context, int(kind != _LEAF))
-            if kind != _LEAF and known == 0:
-                write_bit(coder, _ASKS_KNOWN + context, int(kind == _SPLIT_KNOWN))
+        kind = _EMPTY
+        if not coder.record[0].reads:
+            kind = kind_of(tree, region, threshold_bits)
+        kind = code_kind(coder, walk, voxels_of(region), known, kind)
         walk.kind = kind
+        walk.nodes += 1
         if kind == _LEAF:
-            write_leaf(tree, mean, precision, region)
-        elif kind != _EMPTY:
+            for axis in range(3):
+                leaf.low[axis], leaf.high[axis] = region.low[axis], region.high[axis]
+            return True
+        if kind != _EMPTY:
             walk.depth = push_parts(region, stack, walk.depth, int(kind == _SPLIT_KNOWN))
+    return False
+
+
+@lean_kernel
+def code_kind(coder, walk, voxels, known, kind):
+    """Write or read what kind a region of this many voxels is. `known` says that all was measured."""
+    context = size_context(walk, voxels)
+    if known == 0 and code_bit(coder, _ASKS_EMPTY + context, int(kind != _EMPTY)) == 0:
+        return _EMPTY
+    if voxels == 1 or code_bit(coder, _ASKS_LEAF + known * _SIZES + context, int(kind != _LEAF)) == 0:
+        return _LEAF
+    if known == 0 and code_bit(coder, _ASKS_KNOWN + context, int(kind == _SPLIT_KNOWN)) == 0:
+        return _SPLIT
+    return _SPLIT_KNOWN
+
+
+@lean_kernel
+def code_leaf(tree, mean, sigma):
+    """Write or read the codes of a leaf's mean and σ, which are those of the walk's latest leaf then."""
+    walk, coder = tree.walk[0], tree.coder
+    extreme = 1 if walk.mean == 0 else (2 if walk.mean == _MEANS else 0)
+    same_mean = code_bit(coder, _ASKS_MEAN + 2 * extreme + walk.same_mean, int(mean == walk.mean))
+    if same_mean == 0:
+        walk.mean = code_byte(coder, _TELLS_MEAN, mean)
+    same_sigma = code_bit(coder, _ASKS_SIGMA + 2 * same_mean + walk.same_sigma, int(sigma == walk.sigma))
+    if same_sigma == 0:
+        walk.sigma = (walk.sigma + code_change(coder, _TELLS_SIGMA, sigma - walk.sigma)) & 255
+    walk.same_mean, walk.same_sigma = same_mean, same_sigma
+    walk.leaves += 1
 
 
 @lean_kernel
@@ -240,45 +277,27 @@ def fill_levels(walk, mean, precision, levels):
 
 
 @lean_kernel
-def kind_of(tree, region, known, threshold_bits):
-    """Return whether a region is empty, a leaf, or cut: by what was measured, and by eqs. 1-2.
-
-    `known` says that all of it was measured.
-    """
+def kind_of(tree, region, threshold_bits):
+    """Return whether a region is empty, a leaf, or cut: by what was measured, and by eqs. 1-2."""
     walk, levels, size = tree.walk[0], tree.levels, tree.walk[0].size
     i0, i1 = max(region.low[0], walk.low[0]), min(region.high[0], walk.high[0])
     j0, j1 = max(region.low[1], walk.low[1]), min(region.high[1], walk.high[1])
     k0, k1 = max(region.low[2], walk.low[2]), min(region.high[2], walk.high[2])
     if i0 >= i1 or j0 >= j1 or k0 >= k1:
         return _EMPTY
-    voxels = voxels_of(region)
-    whole = voxels == (i1 - i0) * (j1 - j0) * (k1 - k0)
-    first, alike = levels[(i0 * size[1] + j0) * size[2] + k0], True
+    least, most = _UNKNOWN, np.uint8(0)
     for i in range(i0, i1):
         for j in range(j0, j1):
-            row, differs = (i * size[1] + j) * size[2], np.uint8(0)
+            row = (i * size[1] + j) * size[2]
             for voxel in range(row + k0, row + k1):
-                differs |= levels[voxel] ^ first
-            if differs != 0:
-                alike = False
-                break
-        if not alike:
-            break
-    if alike and first == _UNKNOWN:
+                least, most = min(least, levels[voxel]), max(most, levels[voxel])
+    voxels = voxels_of(region)
+    if least == _UNKNOWN:
         return _EMPTY
-    if not whole:
+    if most == _UNKNOWN or voxels > (i1 - i0) * (j1 - j0) * (k1 - k0):
         return _SPLIT
-    if alike:
-        return _LEAF
-    if not known:
-        for i in range(i0, i1):
-            for j in range(j0, j1):
-                row, unknown = (i * size[1] + j) * size[2], np.uint8(0)
-                for voxel in range(row + k0, row + k1):
-                    unknown = max(unknown, levels[voxel])
-                if unknown == _UNKNOWN:
-                    return _SPLIT
-    return _LEAF if information_bits(tree, region, voxels) <= threshold_bits else _SPLIT_KNOWN
+    alike = least == most or information_bits(tree, region, voxels) <= threshold_bits
+    return _LEAF if alike else _SPLIT_KNOWN
 
 
 @lean_kernel
@@ -306,10 +325,9 @@ def sigma_code(variance):
 
 
 @lean_kernel
-def write_leaf(tree, mean, precision, region):
-    """Write a leaf's mean and σ: σ² is that of its least known voxel, and the spread of its coverages."""
-    walk, coder = tree.walk[0], tree.coder
-    low, high, size = region.low, region.high, walk.size
+def leaf_codes(tree, mean, precision):
+    """Return the leaf's codes of mean and σ: σ² of its least known voxel, and the spread of coverages."""
+    low, high, size = tree.leaf[0].low, tree.leaf[0].high, tree.walk[0].size
     total, count, least = 0.0, 0, math.inf
     for i in range(low[0], high[0]):
         for j in range(low[1], high[1]):
@@ -326,68 +344,6 @@ def write_leaf(tree, mean, precision, region):
             for voxel in range(row + low[2], row + high[2]):
                 error = np.float64(mean[voxel]) - said
                 spread += error * error
-    sigma = min(sigma_code(1.0 / least + spread / count), 255)
-    same_mean, same_sigma = int(code == walk.mean), int(sigma == walk.sigma)
-    write_bit(coder, mean_context(walk), same_mean)
-    if same_mean == 0:
-        write_byte(coder, _TELLS_MEAN, code)
-    write_bit(coder, _ASKS_SIGMA + 2 * same_mean + walk.same_sigma, same_sigma)
-    if same_sigma == 0:
-        write_change(coder, _TELLS_SIGMA, sigma - walk.sigma)
-    note_leaf(walk, code, sigma, same_mean, same_sigma)
-
-
-@inlined_kernel
-def note_leaf(walk, mean, sigma, same_mean, same_sigma):
-    """Keep what the next leaf's contexts depend on."""
-    walk.mean, walk.sigma, walk.same_mean, walk.same_sigma = mean, sigma, same_mean, same_sigma
-    walk.leaves += 1
-
-
-@lean_kernel
-def read_leaf(tree):
-    """Read on to the next leaf, which is in `tree.leaf` then; returns whether there is one.
-
-    Any data lead to some tree of the map: that is what a checksum is for.
-
-    Args:
-        tree: Tree, its walk begun, its coder reading.
-    """
-    walk, stack, coder = tree.walk[0], tree.stack, tree.coder
-    while walk.depth > 0:
-        walk.depth -= 1
-        region, known = top(stack, walk.depth), stack[walk.depth, 6]
-        voxels = voxels_of(region)
-        kind, context = _LEAF, size_context(walk, voxels)
-        if known == 0 and read_bit(coder, _ASKS_EMPTY + context) == 0:
-            kind = _EMPTY
-        elif voxels > 1 and read_bit(coder, _ASKS_LEAF + known * _SIZES + context) == 1:
-            kind = _SPLIT_KNOWN
-            if known == 0 and read_bit(coder, _ASKS_KNOWN + context) == 0:
-                kind = _SPLIT
-        walk.nodes += 1
-        walk.kind = kind
-        if kind == _LEAF:
-            read_values(tree, region)
-            return True
-        if kind != _EMPTY:
-            walk.depth = push_parts(region, stack, walk.depth, int(kind == _SPLIT_KNOWN))
-    return False
-
-
-@lean_kernel
-def read_values(tree, region):
-    """Read what the leaf of a region says."""
-    walk, coder, leaf = tree.walk[0], tree.coder, tree.leaf[0]
-    mean, sigma = walk.mean, walk.sigma
-    same_mean = read_bit(coder, mean_context(walk))
-    if same_mean == 0:
-        mean = read_byte(coder, _TELLS_MEAN)
-    same_sigma = read_bit(coder, _ASKS_SIGMA + 2 * same_mean + walk.same_sigma)
-    if same_sigma == 0:
-        sigma = (sigma + read_change(coder, _TELLS_SIGMA)) & 255
-    note_leaf(walk, mean, sigma, same_mean, same_sigma)
-    told = _FINEST * 2.0 ** (sigma / _STEPS)
-    leaf.mean, leaf.precision = np.float32(mean / _MEANS), np.float32(_SLACK / (told * told))
-    for axis in range(3):
-        leaf.low[axis], leaf.high[axis] = region.low[axis], region.high[axis]
+    variance = 1.0 / least + spread / count
+    least_code = max(math.ceil(0.5 * _STEPS * math.log2(variance / (_FINEST * _FINEST))), 0)
+    return code, min(least_code, 255)

@@ -3,6 +3,9 @@
 Each decision has a context, and each context learns how often its decisions were 0: fast at first, then as a
 moving average over about 32 of them. The form is that of LZMA, of whose last bytes those are left out that
 are zeros: whoever reads beyond the end reads zeros.
+
+Writing and reading are one: `code_bit`, and what is made of it, writes what it is given, or disregards that
+and returns what was written.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ CODER = record_type(
         ("place", "i8"),  # in the data: of the next byte
         ("last", "i8"),  # where the data end; writing: behind the last byte that is not 0
         ("flat", "?"),  # whether all decisions count as equally likely, so that many bytes are never needed
+        ("reads", "?"),  # whether decisions are read, not written
     ]
 )
 """How far a coder has come."""
@@ -55,8 +59,20 @@ def begin_writing(coder, place, flat):
     """
     record = coder.record[0]
     record.low, record.range, record.held = np.uint64(0), _FULL, np.uint64(0)
-    record.waiting, record.place, record.last, record.flat = 1, place - 1, place, flat
+    record.waiting, record.place, record.last = 1, place - 1, place
+    record.flat, record.reads = flat, False
     forget(coder.odds)
+
+
+@lean_kernel
+def begin_reading(coder, first, last, flat):
+    """Read the data from place `first` up to, not including, `last`."""
+    record = coder.record[0]
+    record.low, record.range = np.uint64(0), _FULL
+    record.place, record.last, record.flat, record.reads = first, last, flat, True
+    forget(coder.odds)
+    for _ in range(4):
+        record.low = record.low << _8 | get(record, coder.data)
 
 
 @lean_kernel
@@ -90,19 +106,25 @@ def learn(coder, record, context, bit):
 
 
 @inlined_kernel
-def write_bit(coder, context, bit):
-    """Write a decision, 0 or 1, of a context."""
+def code_bit(coder, context, bit):
+    """Write or read a decision, 0 or 1, of a context; returns it."""
     record = coder.record[0]
     bound = (record.range >> _12) * odds_of_zero(coder, record, context)
+    if record.reads:
+        bit = int(record.low >= bound)
     if bit == 0:
         record.range = bound
     else:
-        record.low += bound
         record.range -= bound
+        record.low = record.low - bound if record.reads else record.low + bound
     learn(coder, record, context, bit)
     while record.range < _TOP:
         record.range <<= _8
-        shift_out(record, coder.data)
+        if record.reads:
+            record.low = record.low << _8 | get(record, coder.data)
+        else:
+            shift_out(record, coder.data)
+    return bit
 
 
 @lean_kernel
@@ -144,17 +166,6 @@ def end_writing(coder, first):
     return max(record.last, first)
 
 
-@lean_kernel
-def begin_reading(coder, first, last, flat):
-    """Read the data from place `first` up to, not including, `last`."""
-    record = coder.record[0]
-    record.low, record.range = np.uint64(0), _FULL
-    record.place, record.last, record.flat = first, last, flat
-    forget(coder.odds)
-    for _ in range(4):
-        record.low = record.low << _8 | get(record, coder.data)
-
-
 @inlined_kernel
 def get(record, data):
     """Return the next byte; 0 behind the end."""
@@ -163,71 +174,30 @@ def get(record, data):
     return byte
 
 
-@inlined_kernel
-def read_bit(coder, context):
-    """Return the next decision, 0 or 1, which is of this context."""
-    record = coder.record[0]
-    bound = (record.range >> _12) * odds_of_zero(coder, record, context)
-    if record.low < bound:
-        record.range = bound
-        bit = 0
-    else:
-        record.low -= bound
-        record.range -= bound
-        bit = 1
-    learn(coder, record, context, bit)
-    while record.range < _TOP:
-        record.range <<= _8
-        record.low = record.low << _8 | get(record, coder.data)
-    return bit
-
-
 @lean_kernel
-def write_byte(coder, contexts, byte):
-    """Write a number below 256 as eight decisions, of the 256 contexts from number `contexts` on."""
+def code_byte(coder, contexts, byte):
+    """Write or read a number below 256 as eight decisions, of the 256 contexts from number `contexts` on."""
     node = 1
     for place in range(7, -1, -1):
-        bit = (byte >> place) & 1
-        write_bit(coder, contexts + node, bit)
-        node = node << 1 | bit
-
-
-@lean_kernel
-def read_byte(coder, contexts):
-    """Return the next number below 256: see `write_byte`."""
-    node = 1
-    for _ in range(8):
-        node = node << 1 | read_bit(coder, contexts + node)
+        node = node << 1 | code_bit(coder, contexts + node, (byte >> place) & 1)
     return node & 255
 
 
 @lean_kernel
-def write_change(coder, contexts, change):
-    """Write a whole number other than 0, between -256 and 256: its sign, and its size in Elias's gamma code.
+def code_change(coder, contexts, change):
+    """Write or read a whole number other than 0, between -256 and 256: its sign, and its size in gamma code.
+
+    Elias's gamma code tells how many bits there are below the highest one, and then these.
 
     Args:
         coder: Coder.
         contexts: Number of the first of 73 contexts.
         change: The number.
     """
-    write_bit(coder, contexts, int(change < 0))
-    size, bits = abs(change), 0
-    while size >> (bits + 1) > 0:
-        write_bit(coder, contexts + 1 + bits, 1)
-        bits += 1
-    if bits < 7:
-        write_bit(coder, contexts + 1 + bits, 0)
-    for place in range(bits - 1, -1, -1):
-        write_bit(coder, contexts + 9 + 8 * bits + place, (size >> place) & 1)
-
-
-@lean_kernel
-def read_change(coder, contexts):
-    """Return the next whole number: see `write_change`."""
-    negative, bits = read_bit(coder, contexts), 0
-    while bits < 7 and read_bit(coder, contexts + 1 + bits) == 1:
+    negative, bits, told = code_bit(coder, contexts, int(change < 0)), 0, abs(change)
+    while bits < 7 and code_bit(coder, contexts + 1 + bits, int(told >> (bits + 1) > 0)) == 1:
         bits += 1
     size = 1
     for place in range(bits - 1, -1, -1):
-        size = size << 1 | read_bit(coder, contexts + 9 + 8 * bits + place)
+        size = size << 1 | code_bit(coder, contexts + 9 + 8 * bits + place, (told >> place) & 1)
     return -size if negative == 1 else size

@@ -14,13 +14,10 @@ from entropy_explore_env.robots.range_coder import (
     Coder,
     begin_reading,
     begin_writing,
+    code_bit,
+    code_byte,
+    code_change,
     end_writing,
-    read_bit,
-    read_byte,
-    read_change,
-    write_bit,
-    write_byte,
-    write_change,
 )
 from tests.reference.scenes import drawn, seeds
 
@@ -37,9 +34,9 @@ def written(numbers, changes, flat=False, room=20_000):
     coder = new_coder(room)
     begin_writing(coder, FIRST, flat)
     for number in numbers:
-        write_byte(coder, 0, number)
+        code_byte(coder, 0, number)
     for change in changes:
-        write_change(coder, 256, change)
+        code_change(coder, 256, change)
     return coder.data, end_writing(coder, FIRST)
 
 
@@ -55,8 +52,8 @@ def test_what_is_written_is_read_again(numbers, changes, flat):
     coder = new_coder(0)._replace(data=data.copy())
     coder.data[end:] = 55  # what is behind the end does not matter
     begin_reading(coder, FIRST, end, flat)
-    assert [read_byte(coder, 0) for _ in numbers] == numbers
-    assert [read_change(coder, 256) for _ in changes] == changes
+    assert [code_byte(coder, 0, 0) for _ in numbers] == numbers
+    assert [code_change(coder, 256, 0) for _ in changes] == changes
 
 
 def test_every_number_comes_back_once_the_odds_have_learned():
@@ -64,8 +61,8 @@ def test_every_number_comes_back_once_the_odds_have_learned():
     data, end = written(numbers, changes)
     coder = new_coder(0)._replace(data=data)
     begin_reading(coder, FIRST, end, False)
-    assert [read_byte(coder, 0) for _ in numbers] == numbers
-    assert [read_change(coder, 256) for _ in changes] == changes
+    assert [code_byte(coder, 0, 0) for _ in numbers] == numbers
+    assert [code_change(coder, 256, 0) for _ in changes] == changes
 
 
 @pytest.mark.parametrize("reads", [False, True])
@@ -82,9 +79,9 @@ def test_a_byte_is_done_as_soon_as_an_interval_is_shorter_than_its_place(before,
     record = coder.record[0]
     record["range"], done = before, record["place"] + record["waiting"]
     if reads:
-        read_bit(coder, 0)
+        code_bit(coder, 0, 0)
     else:
-        write_bit(coder, 0, 0)
+        code_bit(coder, 0, 0)
     assert record["range"] == after
     assert record["place"] + record["waiting"] - done == int(after > 1 << 24)
 
@@ -98,7 +95,7 @@ def test_carries_reach_back_through_bytes_of_255(seed):
     data, end = written(numbers, [])
     coder = new_coder(0)._replace(data=data)
     begin_reading(coder, FIRST, end, False)
-    assert [read_byte(coder, 0) for _ in numbers] == numbers
+    assert [code_byte(coder, 0, 0) for _ in numbers] == numbers
 
 
 @pytest.mark.parametrize("share", [0.5, 0.1, 0.01])
