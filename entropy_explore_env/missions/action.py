@@ -108,7 +108,6 @@ def encode_viewpoint(
         rules: The scenario.
         pose: (5,) the robot's pose.
         viewpoint: (5,) x, y, z, yaw, pitch.
-        robot: Its number.
         candidates: (K, 5) viewpoints that were proposed to it, where actions are their numbers.
 
     Returns:

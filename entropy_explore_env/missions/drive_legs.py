@@ -60,7 +60,6 @@ def distance_to_tube(params, mate, time_s, line, distance, touching):
     """How far a body can drive on a line before the tube that a teammate still sweeps.
 
     Args:
-        params: PARAMS of the teammate.
         line: Line of the drive.
         distance: How far it wants to drive, in grid units.
         touching: Sum of the two radii in grid units.

@@ -63,12 +63,9 @@ def draw_start(
     """Return what a mission would start with as an episode of a seed.
 
     Args:
-        scenario: The task.
         fixed: Its worlds that no recipe makes.
-        mission: Which one.
         seed: Of all its random streams.
         episode: How many resets without a seed it is behind the seed's own.
-        options: What is given instead of being drawn.
 
     Raises:
         SettingError: Robots cannot be where they were put.
@@ -98,8 +95,6 @@ def fill_start(scenario: Scenario, rules: Rules, state: MissionState, start: Sta
     """Write a mission's start into its arrays: all but its world, which `truth` and `collision` hold already.
 
     Args:
-        scenario: The task.
-        rules: Its parameters for compiled code.
         state: Changed in place, the rows of this mission alone.
         start: As drawn.
     """

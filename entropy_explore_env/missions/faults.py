@@ -35,9 +35,6 @@ def draw_faults(scenario: Scenario, seed: int, episode: int, states: np.ndarray)
     """Draw when a mission's faults happen, and set their random states.
 
     Args:
-        scenario: The task.
-        seed: Of the mission.
-        episode: See `Missions.draw_episode`.
         states: (A,) FAULT, filled in; nothing happens where it is empty.
     """
     if not len(states):
@@ -62,11 +59,7 @@ def _outage_s(outage: Outage, robot: int, share: float) -> tuple[float, float]:
 
 
 def failing(states: np.ndarray, time_s: np.ndarray | float) -> dict[str, np.ndarray]:
-    """Which robots stand still, are blind or silent at a time.
-
-    Args:
-        states: (…, A) FAULT.
-        time_s: (…, 1), or a number.
+    """Which robots, of (…, A) FAULT, stand still, are blind or silent at a time, a number or (…, 1).
 
     Returns:
         `stopped`, `blind` and `silent`, (…, A) bool. A robot that stands still is said to be neither of the
@@ -90,11 +83,7 @@ def fault_counts(states: np.ndarray) -> dict[str, int]:
 
 @lean_kernel
 def faults_of(params, states, mission):
-    """TeamFaults of a mission; None where there are none.
-
-    Args:
-        params: (A,) FAULT_PARAMS, or None.
-    """
+    """TeamFaults of a mission; None where there are none."""
     if params is None:  # known while compiling: nothing of the rest is compiled
         return None
     return TeamFaults(params, states[mission])

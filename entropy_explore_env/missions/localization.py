@@ -53,8 +53,6 @@ def begin_estimates(seed: int, episode: int, poses: np.ndarray, estimates: np.nd
     """Let robots know exactly where they start, and set their random states.
 
     Args:
-        seed: Of the mission.
-        episode: See `Missions.draw_episode`.
         poses: (A, 5) float64.
         estimates: (A,) ESTIMATE of zeros, filled in; empty where no robot drifts.
     """
@@ -67,9 +65,6 @@ def begin_estimates(seed: int, episode: int, poses: np.ndarray, estimates: np.nd
 def pose_errors(estimates: np.ndarray) -> list[tuple[float, float]]:
     """How wrong one mission's robots were about their poses at the latest changes of their estimates.
 
-    Args:
-        estimates: (A,) ESTIMATE.
-
     Returns:
         Of each robot, the distance in metres between where it believed to be and where it was, and what its
         yaw was off in radians, ≥ 0. Lists: infos tell them after every step.
@@ -81,7 +76,6 @@ def localization_figures(estimates: np.ndarray, scans: int) -> dict[str, float |
     """How wrong a team was about its poses, for tables and records.
 
     Args:
-        estimates: (A,) ESTIMATE.
         scans: That it has taken.
 
     Returns:
@@ -102,11 +96,7 @@ def localization_figures(estimates: np.ndarray, scans: int) -> dict[str, float |
 
 @lean_kernel
 def localization_of(params, estimates, fiducials, landmarks, mission):
-    """TeamLocalization of a mission; None where no robot drifts.
-
-    Args:
-        params: (A,) LOCALIZATION_PARAMS, or None.
-    """
+    """TeamLocalization of a mission; None where no robot drifts."""
     if params is None:  # known while compiling: nothing of the rest is compiled
         return None
     return TeamLocalization(params, estimates[mission], fiducials[mission], landmarks[mission])
@@ -283,11 +273,7 @@ def whole_pose(pose):
 
 @lean_kernel
 def note_covariance(localization, index, covariances, slot):
-    """Put the covariance of a robot's latest scan beside a batch of its measurements, if batches have one.
-
-    Args:
-        covariances: (Q, 10) float64, of batches; changed in place.
-    """
+    """Put the covariance of a robot's latest scan beside a batch of its measurements, if batches have one."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return
     copy_numbers(localization.estimates[index].packed, covariances[slot], covariances.shape[1])
@@ -295,12 +281,7 @@ def note_covariance(localization, index, covariances, slot):
 
 @lean_kernel
 def weigh_batch(localization, covariances, slot, scan, count, voxel_size_m):
-    """Lower the precision of a batch's measurements by the covariance beside it, if batches have one.
-
-    Args:
-        covariances: (Q, 10) float64, of batches.
-        scan: Scan that its measurements were unpacked into.
-    """
+    """Lower the precision of a batch's measurements by the covariance beside it, if batches have one."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return
     weigh_by_covariance(scan.rays, count, covariances[slot], voxel_size_m)

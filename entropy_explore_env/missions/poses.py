@@ -135,11 +135,7 @@ def pose_at(params, robot, time_s):
 
 @lean_kernel
 def driven_metres(params, missions, robots, out):
-    """Fill (E, A): metres that robots have driven up to now; `distance_m` counts a drive when it begins.
-
-    Args:
-        out: (E, A) float64.
-    """
+    """Fill (E, A): metres that robots have driven up to now; `distance_m` counts a drive when it begins."""
     for mission in range(robots.shape[0]):
         time_s = missions[mission].time_s
         for index in range(robots.shape[1]):

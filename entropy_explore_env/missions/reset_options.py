@@ -78,7 +78,6 @@ def mission_options(options: Mapping[str, Any], scenario: Scenario) -> ResetOpti
 
     Args:
         options: As `named_options` gives them; other names than these are left alone.
-        scenario: The task.
 
     Raises:
         SettingError: The starts are no (A, 5) finite numbers, or the world is no number that the scenario
@@ -99,8 +98,6 @@ def batch_options(options: Mapping[str, Any], scenario: Scenario, missions: int)
 
     Args:
         options: As for `mission_options`; one value for all missions, or E values.
-        scenario: The task.
-        missions: E.
 
     Raises:
         SettingError: As for `mission_options`, or there are not E values.

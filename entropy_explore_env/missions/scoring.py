@@ -48,11 +48,7 @@ def note_seen(params, clock, robots):
 
 @lean_kernel
 def note_idle(clock, robots, idle):
-    """Count a scan that showed nothing new of what can be seen; begin anew after one that did.
-
-    Args:
-        idle: Whether the scan showed nothing new.
-    """
+    """Count a scan that showed nothing new of what can be seen; begin anew after one that did."""
     if idle:
         clock.idle_scans += 1
     else:
@@ -76,7 +72,6 @@ def holds_enough(clock, visible, truth, precision, prior_precision):
     It counts all voxels: for missions whose joint map holds enough already.
 
     Args:
-        visible: (V,) bool, what can be seen.
         precision: (V,) float32 of the robot's belief.
         prior_precision: 1/σ² of a voxel that it neither measured nor was told of.
     """

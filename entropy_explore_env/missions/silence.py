@@ -19,11 +19,6 @@ def is_silent(params, heard, time_s):
     Until it must be heard again it may drive, for twice the time of the straight drive to the viewpoint that
     it announced, turn half round, scan, and wait behind a teammate; its message may wait for the end of a
     phase, or for the time between summaries, and be delayed.
-
-    Args:
-        params: PARAMS of the teammate.
-        heard: HEARD of it.
-        time_s: Now.
     """
     unheard_s = time_s - heard["heard_s"]
     if heard["heard_s"] < 0.0 or unheard_s <= SILENT_AFTER_S:

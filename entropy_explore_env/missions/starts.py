@@ -26,8 +26,6 @@ def start_poses(scenario: Scenario, world: World, rng: np.random.Generator) -> n
     where the scenario says so, near the first one.
 
     Args:
-        scenario: The task.
-        world: The true world.
         rng: The stream of starts.
 
     Returns:
@@ -79,8 +77,6 @@ def checked_starts(scenario: Scenario, world: World, starts: np.ndarray) -> np.n
     matter.
 
     Args:
-        scenario: The task.
-        world: The true world.
         starts: (A, 5) float64, finite: x, y, z, yaw, pitch.
 
     Returns:

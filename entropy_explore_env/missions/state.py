@@ -193,8 +193,6 @@ def state_arrays(scenario: Scenario, missions: int, cells: int) -> dict[str, Sta
     """Return shape, type and range of each array of a MissionState.
 
     Args:
-        scenario: The task.
-        missions: E.
         cells: C, of the overview.
     """
     e, a, r = missions, scenario.robots, max(kind.sensor.rays for kind in scenario.kinds)

@@ -68,11 +68,7 @@ def write_own(summaries, params, index):
 
 @lean_kernel
 def send_summary(summaries, team, maps, clock, in_flight, index, length, recipients):
-    """Broadcast the summary that was written, which teammates fuse at once or after the delay.
-
-    Args:
-        length: Bytes of the summary.
-    """
+    """Broadcast the summary that was written, which teammates fuse at once or after the delay."""
     robot, time_s = team.robots[index], clock.time_s
     delay_s = team.params[0].delay_s + draw_lateness(team.faults, index)
     bits = summary_bits(team.localization, length)
@@ -182,7 +178,6 @@ def hear_summary(tree, team, maps, recipients, length, most):
     Args:
         tree: Tree, the summary in its data.
         recipients: (A,) bool, which robots hear it.
-        length: Bytes of the summary.
         most: Most precision that a leaf has.
     """
     if not open_summary(tree, length, grid_size(team.params[0])):

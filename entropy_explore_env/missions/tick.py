@@ -67,11 +67,7 @@ class Mission(NamedTuple):
 
 @lean_kernel
 def step_missions(rules, state, choices, work, continuous, discrete, first, last):
-    """Advance the missions `first` … `last` - 1 by one step; those that are over stand still.
-
-    Args:
-        choices: (E, A) CHOICE, scratch space; those of robots that plan are filled in.
-    """
+    """Advance the missions `first` … `last` - 1 by one step; those that are over stand still."""
     masks = rules.params[0].bodies
     for m in range(first, last):
         mission = Mission(
@@ -141,9 +137,6 @@ def depart(team, clock, in_flight, collision, choices, work):
     """Let the robots that decide depart and announce where they go, one after the other.
 
     Robots under way that keep their viewpoint drive on.
-
-    Args:
-        collision: (N, V) float32 collision masks of this mission.
     """
     for index in range(len(team.robots)):
         robot, own = team.robots[index], team.params[index]

@@ -46,9 +46,6 @@ class ViewProposer:
     def propose(self, view: RobotView) -> np.ndarray:
         """Return the viewpoints that are proposed to a robot that decides: at the same time, always the same.
 
-        Args:
-            view: Of the robot, which decides.
-
         Returns:
             (n, 5) float64, map frame, the planner's own choice first; n ≥ 1.
         """

@@ -61,9 +61,6 @@ class ViewObserver:
     def observe(self, view: RobotView) -> np.ndarray:
         """Return the flat observation of a robot.
 
-        Args:
-            view: Of the robot.
-
         Returns:
             (F,) float32.
         """
@@ -111,7 +108,6 @@ class ViewObserver:
         """Where an action of the policy sends a robot.
 
         Args:
-            view: Of the robot.
             action: A number, or (N,), as the policy's action says.
 
         Returns:

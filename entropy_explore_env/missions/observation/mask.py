@@ -49,11 +49,7 @@ def observe_mask(begin, params, actions, start, mean, row):
 
 @lean_kernel
 def mask_missions(params, actions, missions, robots, estimates, mean, out):
-    """Fill (E, A, N) int8, the masks of all robots' discrete actions.
-
-    Args:
-        out: Filled in.
-    """
+    """Fill (E, A, N) int8, the masks of all robots' discrete actions."""
     for mission in range(out.shape[0]):
         for robot in range(out.shape[1]):
             own = params[robot]
