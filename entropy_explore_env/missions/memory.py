@@ -1,4 +1,4 @@
-"""How much memory missions need, counted from their settings before any of it is taken."""
+"""How much memory missions need, estimated from their settings before any of it is taken."""
 
 from __future__ import annotations
 
@@ -8,31 +8,34 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.missions.observation.layout import observation_parts
-from entropy_explore_env.missions.rules import (
-    POINT,
-    collision_bodies,
-    discrete_moves,
-    gaze_set,
-    overview_shape,
-)
+from entropy_explore_env.missions.rules import discrete_moves, gaze_set, overview_shape
 from entropy_explore_env.missions.state import state_arrays
-from entropy_explore_env.planner.model import proposal_bytes
-from entropy_explore_env.robots.map_summary import summary_bytes
-from entropy_explore_env.robots.navigator import navigator_bytes
 from entropy_explore_env.robots.range_sensor import scan_bytes
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
 
-_SPACE_BYTES = 10
-"""Of a number of an observation in its space: two float32 bounds, and whether there are these bounds."""
-_MAPS = (
-    *("truth", "collision", "mean", "precision", "joint_mean", "joint_precision"),
-    *("visible", "drivable", "own_mean", "own_precision"),
+_SHOWN_BYTES = 18
+"""Of a number of an observation: two float32, of the missions and handed out, and its bounds in spaces."""
+_WORLD_BYTES = 12
+"""Of a voxel of a world: whether it is solid, and for each kind of robot masks and the number of a start."""
+_SEARCH_BYTES, _PROPOSAL_BYTES = 21, 42
+"""Of a voxel in a thread's memory for paths, and for candidates, once searches have come there."""
+_PARTS = (
+    ("pooled maps", "Observation.overview_shape", ("pooled",)),
+    ("scans", "RangeSensor.angular_step_rad", ("scan_",)),
+    ("delayed messages", "Channel.delay_s", ("in_flight",)),
+    ("the broadcast in phases", "Channel.phase_s", ("phase",)),
+    ("candidates", "Action.candidates", ("candidates", "experience")),
+    (
+        "what robots heard",
+        "Scenario.robots",
+        ("missions", "robots", "heard", "faults", "estimates", "fiducials", "landmarks", "summaries"),
+    ),
 )
+"""Purpose, setting that lowers it, and how the names of arrays of the state begin; the others are maps."""
 _LAST_GROUP = Path("/sys/fs/cgroup/memory.max")
 _SETTING_OF_PART = {
     "panorama": "Observation.panorama_yaws",
@@ -69,7 +72,7 @@ class Need(NamedTuple):
 
 
 def memory_needs(scenario: Scenario, batch: Batch) -> list[Need]:
-    """Return what missions hold in memory after their first steps, adapters included.
+    """Return about what missions hold in memory after their first steps, adapters included.
 
     Kept out: Python's own objects, compiled code, pictures, and whatever strategies hold.
 
@@ -77,88 +80,51 @@ def memory_needs(scenario: Scenario, batch: Batch) -> list[Need]:
         scenario: The task, its grid that of its world.
         batch: How many missions there are.
     """
-    missions, cells = batch.missions, math.prod(overview_shape(scenario) or (0,))
+    cells = math.prod(overview_shape(scenario) or (0,))
     sizes = {
         name: math.prod(array.shape) * array.dtype.itemsize
-        for name, array in state_arrays(scenario, missions, cells).items()
+        for name, array in state_arrays(scenario, batch.missions, cells).items()
     }
-    delayed = sum(size for name, size in sizes.items() if name.startswith("in_flight"))
-    phases = sum(size for name, size in sizes.items() if name.startswith("phase"))
-    scans = sum(sizes[name] for name in ("scan_range_m", "scan_returned", "scan_utility_bits"))
-    robots = sum(sizes[name] for name in ("missions", "robots", "heard", "faults", "estimates"))
-    robots += sizes["fiducials"] + sizes["landmarks"] + sizes["summaries"]
-    proposed = sizes["candidates"] + sizes["experience"]
-    maps = sum(sizes[name] for name in _MAPS) + _world_bytes(scenario, batch)
-    burst = "Channel.burst" if scenario.channel.burst > 1 else "robots"
+    needs = []
+    for purpose, setting, beginnings in _PARTS:
+        names = [name for name in sizes if name.startswith(beginnings)]
+        needs.append(Need(purpose, sum(sizes.pop(name) for name in names), setting))
+    maps = sum(sizes.values()) + _world_bytes(scenario, batch)
+    shown = _SHOWN_BYTES * batch.missions * scenario.robots
     return [
-        Need("maps", maps, "missions" if missions > 1 else "Grid.voxel_size_m"),
-        Need("pooled maps", sizes["pooled"], "Observation.overview_shape"),
-        Need("what robots heard", robots, "Scenario.robots"),
-        Need("scans", scans, "RangeSensor.angular_step_rad"),
-        Need("delayed messages", delayed, "Channel.delay_s" if scenario.robots < 100 else burst),
-        Need("the broadcast in phases", phases, "Channel.phase_s"),
-        Need("candidates", proposed, "Action.candidates"),
-        *_observation_needs(scenario, batch),
+        Need("maps", maps, "missions" if batch.missions > 1 else "Grid.voxel_size_m"),
+        *needs,
+        *(
+            Need(f"observations: {name}", shown * (part.stop - part.start), _SETTING_OF_PART[name])
+            for name, part in observation_parts(scenario).items()
+        ),
         *_scratch_needs(scenario, batch),
     ]
 
 
 def _world_bytes(scenario: Scenario, batch: Batch) -> int:
-    """Return the size of worlds with their masks, starts and visible voxels, and of no-fly masks."""
-    voxels, planar = scenario.grid.voxels, scenario.grid.shape[0] * scenario.grid.shape[1]
-    layouts = 0
-    for kind in set(scenario.kinds):
-        layouts += 2 * voxels + 8 * (voxels if scenario.layer_of(kind.robot) is None else planar)
-    if batch.given:
-        collisions_apart = any(w.ceiling is not None or w.unreadable is not None for w in batch.given)
-        held = len(batch.given) * layouts
-    else:
-        from_file = scenario.world not in RECIPES  # such a world may have a ceiling, or unreadable voxels
-        collisions_apart = from_file or any(name in scenario.world for name in ("terrain", "cliff"))
-        worlds = 1 if from_file or scenario.world == "empty" else batch.missions
-        held = worlds * (layouts + voxels + (4 * planar if collisions_apart else 0))
-    if not collisions_apart:  # what robots collide with is what rays are cast through
-        return held
-    bodies = collision_bodies(scenario)
-    planned = any(kind.robot.navigator == "planned" for kind in scenario.kinds)
-    masks = batch.missions * voxels * ((len(bodies) if planned else 0) + (4 if bodies == [POINT] else 0))
-    return held + masks
-
-
-def _observation_needs(scenario: Scenario, batch: Batch) -> list[Need]:
-    """Return a need for each part: the missions' observations, those handed out last, and their spaces."""
-    rows = batch.missions * scenario.robots
-    each = 8 * rows + _SPACE_BYTES * (rows + scenario.robots) + 16
-    return [
-        Need(f"observations: {name}", each * (part.stop - part.start), _SETTING_OF_PART[name])
-        for name, part in observation_parts(scenario).items()
-    ]
+    """Return about the size of worlds with their masks and starts; worlds of recipes are drawn anew."""
+    drawn = scenario.world in RECIPES and scenario.world != "empty"
+    worlds = len(batch.given) or (batch.missions if drawn else 1)
+    return worlds * _WORLD_BYTES * len(set(scenario.kinds)) * scenario.grid.voxels
 
 
 def _scratch_needs(scenario: Scenario, batch: Batch) -> list[Need]:
     """Scratch memory of each thread, and what all share of actions."""
-    kinds, grid = scenario.kinds, scenario.grid
-    sensors, robots = [kind.sensor for kind in kinds], [kind.robot for kind in kinds]
-    rays = max(sensor.rays for sensor in sensors)
-    longest_m = max(math.inf if robot.navigator == "planned" else robot.reach_m for robot in robots)
-    drive = 12 * longest_crossing(*grid.shape, longest_m / grid.voxel_size_m, 1)
-    if scenario.channel.reach != "distance":
-        drive += 12 * longest_crossing(*grid.shape, math.inf, 1)
-    scans = batch.threads * (scan_bytes(grid, sensors, rays) + drive + 33 * scenario.robots)
-    plans = navigator_bytes(scenario) if any(robot.navigator == "planned" for robot in robots) else 0
+    voxels, sensors = scenario.grid.voxels, [kind.sensor for kind in scenario.kinds]
+    scans = scan_bytes(scenario.grid, sensors, max(sensor.rays for sensor in sensors))
+    plans = any(kind.robot.navigator == "planned" for kind in scenario.kinds) * _SEARCH_BYTES * voxels
+    proposing = (scenario.action.kind == "candidates") * _PROPOSAL_BYTES * voxels
     masks = 0
     if scenario.action.kind == "discrete":
         gazes = gaze_set(scenario.action.yaws, 1 if scenario.planar else scenario.action.pitches)
         masks = batch.missions * scenario.robots * len(discrete_moves(scenario)) * len(gazes)
-    proposing = proposal_bytes(scenario) if scenario.action.kind == "candidates" else 0
     most = "threads" if batch.threads > 1 else None
-    summaries = batch.threads * (grid.voxels + summary_bytes(grid.voxels)) if scenario.shares_summaries else 0
     return [
-        Need("rays of a scan", scans, most or "RangeSensor.angular_step_rad"),
+        Need("rays of a scan", batch.threads * scans, most or "RangeSensor.angular_step_rad"),
         Need("paths", batch.threads * plans, most or "Grid.voxel_size_m"),
         Need("proposing candidates", batch.threads * proposing, most or "Grid.voxel_size_m"),
         Need("action masks", masks, "Robot.reach_m"),
-        Need("writing summaries", summaries, most or "Grid.voxel_size_m"),
     ]
 
 

@@ -7,7 +7,6 @@ voxels, K candidates, M teammates, N viewpoints of the pool, F viewpoints at far
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import Costs, Lattice
-from entropy_explore_env.belief.paths.search import Search, new_search, search_bytes
+from entropy_explore_env.belief.paths.search import Search, new_search
 from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.planner.far_places import Blocks, new_blocks
@@ -129,17 +128,6 @@ def _arrays(scenario: Scenario, recipes: Sequence[Recipe]) -> dict[str, tuple[tu
 
 def _block_edge(scenario: Scenario, recipe: Recipe) -> int:
     return max(1, round(recipe.block_m / scenario.grid.voxel_size_m))
-
-
-def proposal_bytes(scenario: Scenario) -> int:
-    """Return the bytes of memory that a thread's proposers share, once searches have reached all voxels."""
-    voxels, recipes = scenario.grid.voxels, [recipe_for(kind) for kind in scenario.kinds]
-    arrays = _arrays(scenario, recipes).values()
-    edges = [_block_edge(scenario, recipe) for recipe in recipes]
-    blocks = sum(math.prod(math.ceil(n / edge) for n in scenario.grid.shape) for edge in edges)
-    scan_bytes = 9 * voxels + 12 * _longest_ray(scenario)
-    kept_bytes = sum(math.prod(shape) * np.dtype(kind).itemsize for shape, kind in arrays)
-    return search_bytes(voxels) + scan_bytes + kept_bytes + 24 * blocks
 
 
 def new_proposers(scenario: Scenario, recipe: Recipe | None = None) -> list[Proposer]:

@@ -21,7 +21,6 @@ from entropy_explore_env.belief.paths.search import (
     is_passable,
     mark_of,
     new_search,
-    search_bytes,
 )
 from entropy_explore_env.belief.paths.string_pulling import Path, line_of_sight_cost, string_pull
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
@@ -110,11 +109,6 @@ def new_navigator(scenario: Scenario, robot: Robot) -> Navigator:
 def breaks_out_of(robot: Robot) -> bool:
     """Return whether a kind of robot plans for a body wider than its own."""
     return robot.planning_radius_m > robot.body_radius_m
-
-
-def navigator_bytes(scenario: Scenario) -> int:
-    """Return the bytes of plans that a thread's navigators share, once plans have reached all voxels."""
-    return search_bytes(scenario.grid.voxels) + 4 * scenario.grid.voxels
 
 
 @lean_kernel

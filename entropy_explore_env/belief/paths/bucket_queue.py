@@ -47,20 +47,12 @@ class BucketQueue(NamedTuple):
     """(1,) of _STATE."""
 
 
-def _blocks(entries: int) -> int:
-    """One block of each bucket is partly filled, one is popped, one is spare."""
-    return entries // _BLOCK_ENTRIES + 1 + BUCKETS + 2
-
-
-def queue_bytes(entries: int) -> int:
-    """Bytes of the arrays of `new_queue`."""
-    return 4 * _blocks(entries) * (_BLOCK_ENTRIES + 1) + 8 * BUCKETS
-
-
 def new_queue(entries: int) -> BucketQueue:
     """Return a queue for this many entries; the system provides the memory when it is first written."""
+    # One block of each bucket is partly filled, one is popped, one is spare.
+    blocks = entries // _BLOCK_ENTRIES + 1 + BUCKETS + 2
     return BucketQueue(
-        np.empty((_blocks(entries), _BLOCK_ENTRIES + 1), np.int32),
+        np.empty((blocks, _BLOCK_ENTRIES + 1), np.int32),
         np.empty((BUCKETS, 2), np.int32),
         np.zeros(1, _STATE),
     )

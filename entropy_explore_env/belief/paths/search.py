@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.paths.bucket_queue import BucketQueue, new_queue, queue_bytes
+from entropy_explore_env.belief.paths.bucket_queue import BucketQueue, new_queue
 from entropy_explore_env.belief.paths.lattice import IMPASSABLE, UNKNOWN, classify_range, classify_voxel
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
@@ -45,11 +45,6 @@ class Search(NamedTuple):
     queue: BucketQueue
     searches: np.ndarray
     """(1,) int64, number of the latest search."""
-
-
-def search_bytes(voxels: int) -> int:
-    """Bytes of the arrays of `new_search`, once a search has reached all voxels."""
-    return 12 * voxels + queue_bytes(voxels + voxels // 8)
 
 
 def new_search(voxels: int) -> Search:
