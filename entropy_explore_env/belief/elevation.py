@@ -186,7 +186,6 @@ def _set_out(board, heights, fixed, gaps):
     """Put heights on a board; returns the widest gap, in steps from a column to the nearest fixed one.
 
     Args:
-        board: Board.
         heights: (X, Y) float64.
         fixed: (X, Y) bool, at least one of them.
         gaps: (X, Y) int32, scratch space.
@@ -247,7 +246,6 @@ def _relax(board, before, factor, sweeps, tolerance, moving):
     the first of them was the last that is needed, they are taken back, and it is done alone.
 
     Args:
-        board: Board, changed in place.
         before: The same; scratch space.
         factor: ω of the over-relaxation, in [1, 2).
         sweeps: Most sweeps.

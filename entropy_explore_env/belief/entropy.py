@@ -37,8 +37,6 @@ def fill_occupancy_entropy(mean, precision, entropy):
     Bhattacharya 2010, eq. 9, with the sign that it lacks.
 
     Args:
-        mean: (V,) float32 expected coverage.
-        precision: (V,) float32, 1/σ².
         entropy: (V,) float32, filled with nats, 0 … ln 2.
     """
     for voxel in range(len(mean)):

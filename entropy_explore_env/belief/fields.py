@@ -36,7 +36,6 @@ def entropy_gradient(precision, i, j, k, voxel_size_m):
         i: Index of voxel l along x.
         j: Along y.
         k: Along z.
-        voxel_size_m: Edge of a voxel.
 
     Returns:
         Three components in bits per metre.

@@ -29,9 +29,7 @@ def landmark_score(belief, prior, voxel):
     """FEF of a voxel, from 0 to 2.
 
     Args:
-        belief: Belief.
         prior: Precision of a voxel that was never measured, float32.
-        voxel: Its number.
     """
     x, y, z = grid_index(belief.size, voxel)
     if belief.precision[voxel] <= prior:

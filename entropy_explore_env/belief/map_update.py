@@ -73,11 +73,9 @@ def fuse_ray(mean, precision, crossed, coverage, free, n, measured):
 
     Args:
         mean: (V,) float32, expected coverage in [0, 1]; changed in place.
-        precision: (V,) float32, 1/σ², > 0; changed in place.
         crossed: (L,) int32, the crossed voxels, each once; `n` of them.
         coverage: (L,) float32, measured coverage, from index `free` on; before it is 0.
         free: Number of leading voxels that measure 0.
-        n: Number of crossed voxels.
         measured: Precision of the measurement, 1/σ(d)².
 
     Returns:
@@ -130,8 +128,6 @@ def fuse_row(mean, precision, first, last, coverage, measured):
     """Fuse one Gaussian of coverage into each of the voxels `first` … `last` - 1 (Rocha04, eqs. 17-18).
 
     Args:
-        mean: (V,) float32, changed in place.
-        precision: (V,) float32, > 0, changed in place.
         first: Number of the first voxel.
         last: One past the last.
         coverage: float32, the mean that is fused.
@@ -160,9 +156,7 @@ def expected_utility(precision, crossed, n, measured):
     """Return the utility in bits that a ray over these voxels would bring; nothing is changed (eq. 27).
 
     Args:
-        precision: (V,) float32, 1/σ².
         crossed: (L,) int32, the crossed voxels; `n` of them.
-        n: Number of crossed voxels.
         measured: Precision of the measurement, 1/σ(d)².
     """
     bits, growth, gain = 0.0, np.float64(1.0), np.float32(measured)
@@ -182,7 +176,6 @@ def fuse_scan(scan, count, mean, precision):
         scan: Scan with crossings filled in; its `utility` is filled with the bits of each ray.
         count: How many rays of `scan.order`, in this order; those that measured nothing bring 0.
         mean: (V,) float32 expected coverage, changed in place.
-        precision: (V,) float32 1/σ², changed in place.
 
     Returns:
         Bits taken from the map's entropy in all.

@@ -49,11 +49,7 @@ def measured_coverage(start, length, size, crossing, n, coverage):
     those near it are computed.
 
     Args:
-        start: (x, y, z), the sensor in grid units.
         length: Measured distance in voxel edges.
-        size: (X, Y, Z) voxels.
-        crossing: Crossing of the ray.
-        n: Number of crossed voxels.
         coverage: (L,) float32, filled from the returned index on.
 
     Returns:

@@ -101,8 +101,6 @@ def fuse_pooled_scan(scan, count, mean, precision, pool):
     Args:
         scan: Scan with crossings filled in.
         count: How many rays of `scan.order`.
-        mean: (V,) float32, changed in place.
-        precision: (V,) float32, changed in place.
         pool: Pool of the same belief.
 
     Returns:

@@ -178,9 +178,6 @@ def cast_ray(coverage, size, line, stop_above, hit_at_length, behind, crossing):
     its line are noted, too.
 
     Args:
-        coverage: (V,) float32, the truth or a belief's mean.
-        size: (X, Y, Z) voxels.
-        line: Line; it starts inside the workspace.
         stop_above: Coverage that stops the ray; NEVER_STOP to trace a measurement that is known.
         hit_at_length: Whether the ray's length is a measured hit rather than the end of its range.
         behind: Voxels to note behind an obstacle.
@@ -230,9 +227,6 @@ def cast_range(coverage, size, line, stop_above):
     """Walk along a line until something ends it, as `cast_ray` does, but note no voxels.
 
     Args:
-        coverage: (V,) float32.
-        size: (X, Y, Z) voxels.
-        line: Line; it starts inside the workspace.
         stop_above: Coverage that stops the ray.
 
     Returns:
@@ -322,9 +316,6 @@ def trace_two(size, first, second, behind, noted_first, noted_second):
     take less than one after the other.
 
     Args:
-        size: (X, Y, Z) voxels.
-        first: Line; it starts inside the workspace.
-        second: Likewise.
         behind: (for first, for second), voxels to note behind the length, where that is a measured hit.
         noted_first: Crossing, filled with the voxels on the first line.
         noted_second: Of the second; none of its arrays is one of `noted_first`.

@@ -15,7 +15,6 @@ def replace_region(belief, size, low, patch, boxes, gains):
 
     Args:
         belief: (mean, precision), each (V,) float32, changed in place.
-        size: (X, Y, Z) voxels of the belief.
         low: (3,) int64, the belief's voxel that is the patch's first; parts outside are left out.
         patch: (mean, precision), each (I, J, K) float32.
         boxes: (B, 2, 3) int64, corners of boxes of the belief.

@@ -160,9 +160,6 @@ def mark_cone(cone, size, occlusion, marks, mark):
     """Give the voxels that are visible in a cone a mark (RochaMI, eqs. 5 and 8).
 
     Args:
-        cone: A CONE.
-        size: (X, Y, Z) voxels.
-        occlusion: An Occlusion, or None.
         marks: (V,) uint8.
         mark: What the visible ones become, 0 … 255.
     """
@@ -188,11 +185,7 @@ def visible_bits(cone, size, precision, known_precision, occlusion, marks):
     """Entropy that a cone covers, and how much of it marked voxels cover, too (RochaMI, eqs. 7 and 10).
 
     Args:
-        cone: A CONE.
-        size: (X, Y, Z) voxels.
-        precision: (V,) float32 1/σ².
         known_precision: 1/σ² of a voxel that counts as known.
-        occlusion: An Occlusion, or None.
         marks: (V,) uint8, 1 for the voxels that the teammates cover.
 
     Returns:

@@ -72,12 +72,6 @@ def edges_in_walls(air, size, start, finish):
     """Return how much of the straight line between two points is in solid voxels, in grid units.
 
     The same from either end. Where the line only touches a voxel it is not in it.
-
-    Args:
-        air: Air.
-        size: (X, Y, Z) voxels.
-        start: (x, y, z) in grid units, inside the workspace.
-        finish: (x, y, z), likewise.
     """
     if finish < start:
         start, finish = finish, start
@@ -116,7 +110,6 @@ def select_measurements(utility, burst, i_min_bits, order):
     more useful than something sent. Equal utilities go by ray number.
 
     Args:
-        utility: (R,) float64 bits of each ray; negative for a ray that measured nothing.
         burst: Most measurements.
         i_min_bits: Least utility.
         order: (R,) int64, its first places are filled with the chosen rays.
@@ -150,7 +143,6 @@ def steered_i_min(i_min_bits, utility, burst, fill):
 
     Args:
         i_min_bits: I_min at the scan, > 0.
-        utility: (R,) float64 bits of each ray; negative for a ray that measured nothing.
         burst: Most measurements of a batch, ≥ 1.
         fill: Share of it, above 0; above 1, poor scans fill it, too.
     """

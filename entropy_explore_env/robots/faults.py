@@ -47,9 +47,6 @@ def spoil_scan(scan, fault, params, scene, start, rng):
     Args:
         scan: Scan as `take_scan` filled it in; changed in place.
         fault: FAULT_PARAMS of the robot.
-        params: SENSOR_PARAMS of its sensor.
-        scene: Scene that it scanned.
-        start: (x, y, z), the sensor in grid units.
         rng: (1,) uint64 random state; drawn from only where rays may be lost.
 
     Returns:

@@ -40,14 +40,11 @@ def fuse_given(scan, model, frame, pose, ranges_m, by_rays, mean, precision):
 
     Args:
         scan: Scan of R rays; those of points are directed already. Utilities are filled in.
-        model: SensorModel.
         frame: (size, voxel_size_m, start): voxels along each axis, their edge, the sensor in grid units.
         pose: (yaw, pitch) of the gaze, radians.
         ranges_m: (R,) float64: 0, or NaN, where nothing was measured; from the sensor's range on the ray met
             nothing within it.
         by_rays: Whether ranges are of the sensor's own rays.
-        mean: (V,) float32, changed in place.
-        precision: (V,) float32, changed in place.
 
     Returns:
         (bits, r̂, α̂): with mean distance and half-angle as of `visibility_parameters`.

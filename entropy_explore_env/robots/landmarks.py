@@ -57,7 +57,6 @@ def added_since(landmark, here, covariance, matrices):
     """Fill in Q, the covariance of what was added to a pose's error since a landmark was chosen.
 
     Args:
-        landmark: LANDMARK.
         here: (x, y, z), where the robot believes to be.
         covariance: (4, 4) float64, Σ, of that pose.
         matrices: (2, 4, 4) float64; the first is filled in, the second is scratch space.
@@ -110,11 +109,9 @@ def correct_by_landmark(estimate, landmark, seen, sigmas, matrices):
     """Correct an estimate by sighting a landmark of the robot's own map again.
 
     Args:
-        estimate: ESTIMATE, changed in place.
         landmark: LANDMARK; its sighting is counted.
         seen: (x, y, z), from the robot to the landmark as measured, turned by the yaw that it believes.
         sigmas: (along, direction), standard deviations of a sighting: metres, radians.
-        matrices: (2, 4, 4) float64, scratch space.
 
     Returns:
         Whether it said anything.
@@ -145,12 +142,10 @@ def foresee_landmark(covariance, landmark, here, away, sigmas, matrices):
     """Take in what sighting a landmark of the robot's own map again should say, where it is as believed.
 
     Args:
-        covariance: (4, 4) float64, Σ; changed in place.
         landmark: LANDMARK, which stays as it is.
         here: (x, y, z), where the robot believes to be.
         away: (x, y, z), from there to where it believes the landmark to be.
         sigmas: As of `correct_by_landmark`.
-        matrices: (2, 4, 4) float64, scratch space.
     """
     if added_since(landmark, here, covariance, matrices):
         take_landmark(covariance, landmark, away, away, sigmas, matrices)
@@ -161,8 +156,6 @@ def take_landmark(covariance, landmark, seen, expected, sigmas, matrices):
     """Take in what a sighting says of what was added since its landmark was chosen.
 
     Args:
-        covariance: (4, 4) float64, Σ; changed in place.
-        landmark: LANDMARK.
         seen: (x, y, z), as of `correct_by_landmark`.
         expected: (x, y, z), from where the robot believes to be to where it believes the landmark to be.
         sigmas: As of `correct_by_landmark`.
@@ -192,9 +185,7 @@ def take_relative(covariance, added, axis, expected, off, variance, taken):
     """Take in what a sighting says along one axis of what was added: as `correct_along`, from Q.
 
     Args:
-        covariance: (4, 4) float64, Σ; changed in place.
         added: (4, 4) float64, Q; likewise.
-        axis: Unit vector.
         expected: (x, y, z), from where the robot believes to be to where it believes the landmark to be.
         off: What was seen less what was expected.
         variance: Along the axis.

@@ -83,7 +83,6 @@ def believed_point(estimate, position):
     """Return (x, y, z) at which a robot believes a point of the world to be, from where it believes to be.
 
     Args:
-        estimate: ESTIMATE; None = exact.
         position: (x, y, z) in the world.
     """
     if estimate is None:  # known while compiling: nothing of the rest is compiled
@@ -131,8 +130,6 @@ def advance_estimate(estimate, params, place, yaw, driven_m):
     drive turns only what comes after it.
 
     Args:
-        estimate: ESTIMATE, changed in place.
-        params: LOCALIZATION_PARAMS.
         place: (x, y, z), where the robot truly is.
         yaw: Its true yaw.
         driven_m: What it has driven since the mission's start.
@@ -173,7 +170,6 @@ def sighting_error(relative, range_sigma_m, bearing_sigma_rad, rng):
         relative: (x, y, z), from the robot to the landmark.
         range_sigma_m: Standard deviation along it.
         bearing_sigma_rad: Of its direction.
-        rng: (1,) uint64 random state.
     """
     ahead, side, up, distance = sight_axes(relative)
     along = range_sigma_m * draw_gaussian(rng)
@@ -201,7 +197,6 @@ def correct_estimate(estimate, seen, expected, range_sigma_m, bearing_sigma_rad)
     which comes to the same without an inverse.
 
     Args:
-        estimate: ESTIMATE, changed in place.
         seen: (x, y, z), from the robot to the landmark as measured, turned by the yaw that it believes.
         expected: (x, y, z), from where the robot believes to be to where the landmark is.
         range_sigma_m: Standard deviation of `seen` along it, > 0.
@@ -239,10 +234,8 @@ def weigh_by_covariance(rays, count, packed, voxel_size_m):
     much as those along it; so errors of all directions count alike.
 
     Args:
-        rays: (R,) RAY.
         count: How many of them.
         packed: (10,) float64, Σ as `pack_covariance` writes it.
-        voxel_size_m: Edge of a voxel.
     """
     place = packed[0] + packed[4] + packed[7]
     x_yaw, y_yaw, yaw = packed[3], packed[6], packed[9]

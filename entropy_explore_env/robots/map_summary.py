@@ -184,9 +184,7 @@ def write_summary(tree, mean, precision, size, low, high, threshold_bits):
 
     Args:
         tree: Tree, with room for `summary_bytes`.
-        mean: (V,) float32, mean coverage.
         precision: (V,) float32, 1/σ² of what is to be sent; looked at in the box only.
-        size: (X, Y, Z) voxels.
         low: (x, y, z), of the box in which alone something was measured.
         high: Its end, not included.
         threshold_bits: Most information content of a leaf.
@@ -213,9 +211,7 @@ def open_summary(tree, length, size):
     Its checksum is not looked at: a message of a mission arrives whole, or not at all.
 
     Args:
-        tree: Tree.
         length: Bytes of the summary, at least 6.
-        size: (X, Y, Z) voxels of the map.
     """
     data = tree.coder.data
     if data[0] != _MAGIC or (data[1] != _LEARNED and data[1] != _FLAT):
@@ -232,7 +228,6 @@ def checksum(data, length, size):
     Args:
         data: (M,) uint8, a summary in its first bytes.
         length: How many it has.
-        size: (X, Y, Z) voxels.
     """
     crc = 0xFFFFFFFF
     for axis in range(3):

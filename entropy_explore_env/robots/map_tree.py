@@ -116,8 +116,6 @@ def begin_walk(tree, size, low, high):
     """Begin with the whole map.
 
     Args:
-        tree: Tree.
-        size: (X, Y, Z) voxels.
         low: Of the box in which alone something was measured.
         high: Its end, not included.
     """
@@ -186,7 +184,6 @@ def write_tree(tree, mean, precision, threshold_bits):
 
     Args:
         tree: Tree, its walk begun, its coder writing.
-        mean: (V,) float32, mean coverage.
         precision: (V,) float32, 1/σ² ≥ 0, of what is to be sent; looked at in the walk's box only.
         threshold_bits: Most information content of a leaf.
     """

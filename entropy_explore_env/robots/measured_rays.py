@@ -17,11 +17,6 @@ def weigh_measurement(scan, index, params, size, start, entered):
     """Measured coverage (eq. 4) and its precision (eq. 5) for a ray with its crossing filled in.
 
     Args:
-        scan: Scan.
-        index: Which ray.
-        params: SENSOR_PARAMS.
-        size: (X, Y, Z) voxels.
-        start: (x, y, z), the sensor in grid units.
         entered: (L,) int64, when the ray entered its voxels.
     """
     ray = scan.rays[index]
@@ -40,11 +35,6 @@ def trace_measurement(scan, index, params, size, voxel_size_m, start, coverage):
 
     Args:
         scan: Holds direction, length and Return of the ray; the rest is filled in.
-        index: Which ray.
-        params: SENSOR_PARAMS.
-        size: (X, Y, Z) voxels.
-        voxel_size_m: Edge of a voxel.
-        start: (x, y, z), the sensor in grid units.
         coverage: (V,) float32, any map of the workspace; what it holds does not matter.
     """
     ray = scan.rays[index]

@@ -175,13 +175,8 @@ def line_believed_blocked(mean, size, footprint, radius, start, finish, crossing
     voxels that the body reaches into already count as free if they are not covered themselves.
 
     Args:
-        mean: (V,) float32 expected coverage.
-        size: (X, Y, Z) voxels.
         footprint: (B, 3) int64, offsets of the voxels that a body touches, by axis; empty = its own.
         radius: Of the body, in grid units.
-        start: (x, y, z) in grid units.
-        finish: (x, y, z), likewise.
-        crossing: Crossing, scratch space.
     """
     x, y, z = finish[0] - start[0], finish[1] - start[1], finish[2] - start[2]
     length = math.sqrt(x * x + y * y + z * z)
@@ -214,10 +209,7 @@ def free_distance(collision, size, line, finish, crossing):
 
     Args:
         collision: (V,) float32, a Collision each: above ½ the body does not fit.
-        size: (X, Y, Z) voxels.
-        line: Line of the drive.
         finish: (x, y, z), where the drive is to end, the line's end.
-        crossing: Crossing, scratch space.
 
     Returns:
         (distance, code): in grid units (to the middle of the last voxel's crossing, if blocked)
@@ -274,7 +266,6 @@ def distance_to_teammate(start, direction, distance, begin, finish, touching):
     the nearest place and, before it, the first contact.
 
     Args:
-        start: (x, y, z) in grid units.
         direction: (x, y, z), a unit vector.
         distance: Wanted distance in grid units.
         begin: (x, y, z), where the teammate is.

@@ -177,10 +177,7 @@ def plan_path(navigator, mean, precision, no_fly, start, goal, waypoints):
 
     Args:
         navigator: Memory of the plan.
-        mean: (V,) float32, the robot's expected coverage.
-        precision: (V,) float32, 1/σ² of it.
         no_fly: (V,) bool, where the body would reach above the ceiling; (0,) = there is no ceiling.
-        start: (x, y, z), inside the workspace.
         goal: (x, y, z), anywhere.
         waypoints: (W, 3) float64, filled in; the start is not among them.
 

@@ -47,7 +47,6 @@ def drift_variances(params, metres, turned):
     """Return (of x and of y, of z, of the yaw): the variances that a piece of a drive adds.
 
     Args:
-        params: LOCALIZATION_PARAMS.
         metres: Driven, ≥ 0.
         turned: Radians, ≥ 0.
     """
@@ -69,7 +68,6 @@ def in_field_of_view(params, yaw, pitch, away):
     """Return whether a landmark is in the field of view of a gaze.
 
     Args:
-        params: LOCALIZATION_PARAMS of the robot.
         yaw: Of the gaze.
         pitch: Downwards.
         away: (x, y, z), from the robot to the landmark.
@@ -88,7 +86,6 @@ def within_half_view(params, turn, tilt):
     """Return whether a direction this many radians beside and below the gaze is in the field of view.
 
     Args:
-        params: LOCALIZATION_PARAMS of the robot.
         turn: In radians, of any number of turns; so is `tilt`.
         tilt: Downwards.
     """
@@ -125,8 +122,6 @@ def correct_along(covariance, axis, expected, off, variance, taken):
     """Correct a pose by what a sighting says along one axis, as a Kalman filter does.
 
     Args:
-        covariance: (4, 4) float64, changed in place.
-        axis: Unit vector.
         expected: As of `correct_by_sighting`.
         off: What was seen less what was expected.
         variance: Of what was seen, along the axis.
@@ -147,7 +142,6 @@ def gain_along(prior, axis, expected, off, variance, taken):
 
     Args:
         prior: (4, 4) float64, covariance of the errors of which the sighting tells.
-        axis: Unit vector.
         expected: As of `correct_by_sighting`.
         off: What was seen less what was expected.
         variance: Of what was seen, along the axis.
@@ -235,7 +229,6 @@ def correct_by_sighting(covariance, seen, expected, range_sigma_m, bearing_sigma
     """Correct a pose by a sighting: three numbers, along the line of sight, sideways and up (eq. 16).
 
     Args:
-        covariance: (4, 4) float64, changed in place.
         seen: (x, y, z), from the robot to the landmark as measured, turned by the yaw that it believes.
         expected: (x, y, z), from where the robot believes to be to where the landmark is; the same as `seen`
             before the sighting is made.

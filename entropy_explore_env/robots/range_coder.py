@@ -190,7 +190,6 @@ def code_change(coder, contexts, change):
     Elias's gamma code tells how many bits there are below the highest one, and then these.
 
     Args:
-        coder: Coder.
         contexts: Number of the first of 73 contexts.
         change: The number.
     """

@@ -215,8 +215,6 @@ def in_view(model, pose, body):
     half diagonal in yaw and pitch.
 
     Args:
-        model: SensorModel.
-        pose: SensorPose.
         body: (4,) float64 centre and radius in grid units.
     """
     yaw, pitch = pose.yaw, pose.pitch
@@ -252,9 +250,6 @@ def take_scan(scan, model, scene, pose, rng):
 
     Args:
         scan: Scan; its rays and their crossings are filled in.
-        model: SensorModel.
-        scene: Scene.
-        pose: SensorPose.
         rng: (1,) uint64 random state; drawn from only where range noise is on.
     """
     params, start = model.params[0], pose.start
@@ -315,12 +310,8 @@ def measure_ray(ray, params, scene, start, end, no_return, rng):
 
     Args:
         ray: RAY; length, distance and Return are filled in.
-        params: SENSOR_PARAMS.
-        scene: Scene.
-        start: (x, y, z), the sensor in grid units.
         end: RayEnd.
         no_return: Whether it ended at a voxel that gives no return.
-        rng: (1,) uint64 random state.
 
     Returns:
         Whether noise has moved its end: then the voxels that were crossed are not those of the measurement.

@@ -261,9 +261,6 @@ def classify_voxel(lattice, costs, voxel, x, y, z, first, last):
     """Class of a voxel: IMPASSABLE, FREE or UNKNOWN.
 
     Args:
-        lattice: The steps.
-        costs: Traversal costs.
-        voxel: Its number.
         x: Its index along x.
         y: Along y.
         z: Along z.

@@ -242,8 +242,6 @@ def search_paths(search, lattice, costs, sources, goal, max_cost):
 
     Args:
         search: Filled in; read it by `cost_to`, `extract_path` and `costs_to_all`.
-        lattice: The steps.
-        costs: Traversal costs.
         sources: (S,) int32, voxels.
         goal: A voxel; ANY_GOAL = all.
         max_cost: Paths that cost more are not found; inf allowed.
@@ -276,8 +274,6 @@ def resume_search(search, lattice, costs, max_cost):
     Args:
         search: As `start_search` or an earlier call left it. Costs above `max_cost`, which `cost_to` gives
             of some voxels, are not final.
-        lattice: As in the search.
-        costs: As in the search.
         max_cost: No less than before; inf allowed.
     """
     query = _Query(ANY_GOAL, (0, 0, 0), BUCKET_WIDTH**-1 / costs.min_per_edge)

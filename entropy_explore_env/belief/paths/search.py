@@ -123,8 +123,6 @@ def extract_path(search, lattice, voxel, path):
     """Write down the path that the latest search found to a voxel.
 
     Args:
-        search: The latest search.
-        lattice: Its steps.
         voxel: Where the path ends.
         path: (N,) int32, filled with the voxels from the source to `voxel`, both included, if they fit.
 

@@ -78,10 +78,6 @@ def line_of_sight_cost(search, lattice, costs, start, finish):
     Args:
         search: The latest search, or one after `start_search`; voxels that are classified here keep their
             marks.
-        lattice: Where the body fits.
-        costs: Traversal costs.
-        start: (x, y, z) in grid units, inside the workspace.
-        finish: (x, y, z), likewise.
 
     Returns:
         The integral of the traversal cost along the line; inf = an impassable voxel is on it.
@@ -180,9 +176,6 @@ def string_pull(search, lattice, costs, path, waypoints):
 
     Args:
         search: The search that found the path, and none after it.
-        lattice: As in the search.
-        costs: As in the search.
-        path: A Path.
         waypoints: (M, 3) float64, filled in; the finish is the last one. If there are more than M, only the
             first M are filled in; N + 2 always suffice.
 
