@@ -15,12 +15,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
-from baselines.strategies.metrics import Options, Value
+from baselines.strategies.metrics import Value
 from baselines.strategies.rules.coordinated_frontier import taken
 from entropy_explore_env.frontiers.knowledge import centres_of, stays, under_way, voxel_of
 from entropy_explore_env.planner.scene import Scene
@@ -29,11 +27,6 @@ from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.settings.scenario import Scenario
 
-_FIRST_REACH = 0.25
-"""Paths are searched so far at first, in sensor ranges: most choices are nearer, and a search over a whole
-range costs more than counting the few candidates beyond that could be better."""
-_EXTENSION = 1.4
-"""Then they are searched this many times as far until that is enough."""
 _driving_times = np.vectorize(driving_time, otypes=[float])
 _DELAY = 1.5
 """Others may be under way this many times the estimated time, which does not include stops at corners."""
@@ -51,15 +44,6 @@ class Choice:
     """Of travel and scan."""
 
 
-class _Lengths(NamedTuple):
-    """Lengths of a robot's paths to candidates."""
-
-    reach: float
-    """Up to which length they were searched, in voxel edges."""
-    edges: np.ndarray
-    """(S,) float64, by the candidates' slots; inf = no path up to that length."""
-
-
 class Allocator:
     """Allocates the candidates of one robot's map, at one of its decisions."""
 
@@ -67,9 +51,8 @@ class Allocator:
         """Take what the robot knows, and the metric."""
         self._view, self._candidates, self._paths = scene.view, scene.cells, scene.paths
         self._centres, self._grid, self._value = scene.centres, scene.view.scenario.grid, value
-        self._lengths: dict[int, _Lengths] = {}
-        self._searched = scene.view.robot
-        """The robot of the latest search."""
+        self._lengths: dict[int, np.ndarray] = {}
+        """Robot → (V,) lengths of its paths to all voxels, in voxel edges."""
 
     def allocate(
         self, stopped: Sequence[int], targets: Sequence[np.ndarray], everybody: bool = False
@@ -110,64 +93,39 @@ class Allocator:
         choice = self._best_listed(robot, targets)
         if choice is not None or robot != self._view.robot:
             return choice
-        if len(self._candidates.listed(all_of_them=True)[0]) == 0:
-            return None
-        self._search(robot, math.inf)
-        everywhere = self._paths.lengths_to(np.arange(self._grid.voxels, dtype=np.int32))
-        self._candidates.replace_unreached(everywhere)
-        self._lengths.clear()  # candidates have moved
+        self._candidates.replace_unreached(self._lengths_from(robot))
         return self._best_listed(robot, targets)
 
     def _best_listed(self, robot: int, targets: Sequence[np.ndarray]) -> Choice | None:
-        """Return the best of a robot's candidates, counting V and searching paths only as far as that needs.
-
-        A candidate beyond the search has at most the value that it has for the shortest path that is still
-        possible. While it is the best by that, paths are searched farther.
-        """
+        """Return the best of a robot's candidates; None where it reaches none that shows anything."""
         slots, voxels = self._candidates.listed()
-        if robot not in self._lengths:
-            self._search(robot, _FIRST_REACH * self._candidates.reach)
-        start, places = self._centres(np.array([self._voxel_of(robot)])), self._centres(voxels)
-        apart, takes = np.linalg.norm(places - start, axis=1), np.zeros(len(slots))
+        edges = self._lengths_from(robot)[voxels]
+        near = np.isfinite(edges)
+        slots, voxels, edges = slots[near], voxels[near], edges[near]
+        if len(slots) == 0:
+            return None
+        places, takes = self._centres(voxels), np.zeros(len(slots))
         for target in targets:
             takes += taken(places, target[:3], self._candidates.reach)
-        counted = np.full(len(slots), np.nan)
-        while True:
-            reach, edges = self._lengths[robot].reach, self._lengths[robot].edges[slots]
-            if math.isinf(reach):
-                near = np.flatnonzero(np.isfinite(edges))
-                slots, voxels, edges, apart = slots[near], voxels[near], edges[near], apart[near]
-                takes, counted = takes[near], counted[near]
-            if len(slots) == 0:
-                return None
-            least = np.where(np.isfinite(edges), edges, np.maximum(reach, apart - 2.0))  # centre to centre
-            seconds = seconds_of(self._view.scenario, robot, least)
-            worth = partial(self._worth, Options(counted, seconds, least, takes))
-            value = self._candidates.worths(slots, voxels, counted, worth)
-            best = int(np.argmax(value))
-            if value[best] == -math.inf:
-                return None
-            if math.isfinite(edges[best]):
-                return Choice(int(voxels[best]), float(value[best]), float(seconds[best]))
-            self._search(robot, _EXTENSION * reach)
+        seconds = seconds_of(self._view.scenario, robot, edges)
 
-    def _worth(self, options: Options, seen: np.ndarray, which: np.ndarray) -> np.ndarray:
-        """Return (N,) values of some options from which (N,) points are seen; -inf where nothing is."""
-        seen_of = Options(seen * self._candidates.point, *(array[which] for array in options[1:]))
-        return np.where(seen > 0.0, self._value(seen_of), -np.inf)
+        def worth(seen: np.ndarray, which: np.ndarray) -> np.ndarray:
+            options = seen * self._candidates.point, seconds[which], edges[which], takes[which]
+            return np.where(seen > 0.0, self._value(*options), -np.inf)
 
-    def _search(self, robot: int, reach: float) -> None:
-        """Search a robot's paths up to a length, and keep the lengths of those that lead to candidates."""
-        if self._searched != robot:
+        value = self._candidates.worths(slots, voxels, worth)
+        best = int(np.argmax(value))
+        if value[best] == -math.inf:
+            return None
+        return Choice(int(voxels[best]), float(value[best]), float(seconds[best]))
+
+    def _lengths_from(self, robot: int) -> np.ndarray:
+        """Return (V,) lengths of a robot's paths to all voxels; inf = no path."""
+        if robot not in self._lengths:
             self._paths.start(self._voxel_of(robot))
-            self._searched = robot
-        farthest = float(sum(self._grid.shape))
-        self._paths.extend(reach if reach < farthest else math.inf)
-        slots, voxels = self._candidates.listed(all_of_them=True)
-        lengths = self._paths.lengths_to(voxels)
-        edges = np.full(len(self._candidates.voxels_of(slice(None))), np.inf)
-        edges[slots] = np.where(lengths <= self._paths.reach, lengths, np.inf)
-        self._lengths[robot] = _Lengths(self._paths.reach, edges)
+            self._paths.extend(math.inf)
+            self._lengths[robot] = self._paths.lengths_to(np.arange(self._grid.voxels, dtype=np.int32))
+        return self._lengths[robot]
 
     def _voxel_of(self, robot: int) -> int:
         """Return the voxel in which a robot was when it was last heard, in the layer of planar robots."""

@@ -5,33 +5,23 @@ per-time visibility: few candidates, one a block; those from which nothing unexp
 a robot drives to its candidate before it chooses again. So they compare metrics, and are not the rules of
 those papers as their authors run them: those are `nearest-frontier` and `coordinated-frontier`.
 
-A metric gives the values (K,) of K options. It is never greater for less V, or for a longer path.
+A metric gives the values (K,) of K options from four arrays (K,): V·(height factor) in points' size;
+seconds of the drives, and of the scans at their stops; lengths of the paths in voxel edges; shares ≥ 0 of a
+frontier's utility that robots take which go near it (Burgard 2005). It is never greater for less V, or for a
+longer path.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.settings.validation import check, check_choice, check_kind, check_not_negative
-
-
-class Options(NamedTuple):
-    """K candidates that a robot can go to; an array (K,) each."""
-
-    seen: np.ndarray
-    """V·(height factor) in points' size."""
-    seconds: np.ndarray
-    """Of the drives, and of the scans at their stops."""
-    edges: np.ndarray
-    """Length of the path in voxel edges."""
-    taken: np.ndarray
-    """Share of a frontier's utility that robots take which go near it, ≥ 0 (Burgard 2005)."""
 
 
 @dataclass(frozen=True)
@@ -53,19 +43,23 @@ class Metric:
             check(self, "beta", "None, or a number ≥ 0", lambda v: 0.0 <= v < math.inf)
         check_not_negative(self, "bonus")
 
-    def __call__(self, options: Options) -> np.ndarray:
+    def __call__(
+        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
+    ) -> np.ndarray:
         """Return the values."""
-        worth = options.seen + self.bonus
-        return worth / options.seconds if self.beta is None else worth - self.beta * options.seconds
+        worth = seen + self.bonus
+        return worth / seconds if self.beta is None else worth - self.beta * seconds
 
 
 @dataclass(frozen=True)
 class Nearest:
     """The candidate with the shortest path (Yamauchi 1998)."""
 
-    def __call__(self, options: Options) -> np.ndarray:
+    def __call__(
+        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
+    ) -> np.ndarray:
         """Return the values."""
-        return -options.edges
+        return -edges
 
 
 @dataclass(frozen=True)
@@ -84,9 +78,11 @@ class Coordinated:
         """Check β."""
         check_not_negative(self, "beta")
 
-    def __call__(self, options: Options) -> np.ndarray:
+    def __call__(
+        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
+    ) -> np.ndarray:
         """Return the values."""
-        return 1.0 - options.taken - self.beta * options.edges
+        return 1.0 - taken - self.beta * edges
 
 
 Value = Metric | Nearest | Coordinated

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from entropy_explore_env.frontiers.blocks import EXCLUDED, NONE, UNMAPPED, Blocks, mark_around
-from entropy_explore_env.frontiers.visibility import new_counter
+from entropy_explore_env.frontiers.visibility import forget_in_range, new_counter
 from entropy_explore_env.frontiers.voxel_states import VoxelStates
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.robot_kind import RobotKind
@@ -26,8 +26,8 @@ Visibility = Literal["ray-cast", "naive"]
 UnexploredGround = Literal["falling", "level"]
 KNOWN_SIGMA = 0.5
 """σ from which on a voxel is known: a single measurement of our sensors brings it far below."""
-BATCH_CELLS = 7500
-"""Cells that are visited in about the time of a Python call."""
+_BATCH = 4
+"""Candidates that are counted in one call; it changes no result."""
 _TURN = 2.0 * math.pi
 _HEADINGS = 16
 """Headings that are compared for a sensor that looks one way."""
@@ -67,7 +67,7 @@ class FrontierMap(ABC):
     """Candidates of one robot's belief, each in a slot, and V(height factor) of each in points.
 
     Counts are reused as upper bounds: while the map grows, no more unexplored points can be seen from a place
-    than before. Only voxels that turn free, or are unexplored again, raise the bounds.
+    than before. Near voxels that turn free, or are unexplored again, the bounds are forgotten.
 
     Attributes:
         reach: Of the sensor, in voxel edges; no more than the workspace is wide.
@@ -76,8 +76,6 @@ class FrontierMap(ABC):
 
     point: float
     """Size of a point: m² in plans and over terrain, else m³."""
-    _batch: int
-    """How many candidates are counted in one call; it changes no result."""
     body_reach: int
     """Voxels that the body extends beyond its own, along an axis."""
     _states: VoxelStates
@@ -92,6 +90,8 @@ class FrontierMap(ABC):
     """Imagined rays all around."""
     _gaze_pitches: Sequence[float]
     """Pitches between which a gaze is chosen."""
+    _sight: tuple[float, float]
+    """Voxel edges within which a change may show more, and how much distances upwards count in that."""
     _most: float
     """No more V·(height factor) is seen from any place."""
 
@@ -132,7 +132,7 @@ class FrontierMap(ABC):
         opened = self._states.opened[: self._states.opened_count[0]]
         self._states.opened_count[0] = 0
         if len(opened):
-            self._raise_bounds(opened)
+            forget_in_range(self._size, opened, self._voxels, self._sight, self._bounds)
 
     def _refresh(self, voxels: np.ndarray, radius: int) -> None:
         """Find the candidates anew within a radius of (K,) voxels."""
@@ -158,10 +158,6 @@ class FrontierMap(ABC):
     @abstractmethod
     def replace_unreached(self, cost: np.ndarray) -> None:
         """Replace candidates that no path reaches by others of their blocks; (V,) float64 path costs."""
-
-    @abstractmethod
-    def _raise_bounds(self, opened: np.ndarray) -> None:
-        """Raise the bounds by what may be visible past (N,) int32 voxels."""
 
     @abstractmethod
     def _count_from(self, voxels: np.ndarray, seen: np.ndarray, weighed: np.ndarray) -> None:
@@ -198,15 +194,10 @@ class FrontierMap(ABC):
             self._count_from(voxels, seen, weighed)
         return seen, weighed
 
-    def upper_bounds(self, slots: np.ndarray) -> np.ndarray:
-        """Return (K,) upper bounds of V·(height factor) of the candidates in (K,) slots."""
-        return np.minimum(self._bounds[slots], self._most)
-
     def worths(
         self,
         slots: np.ndarray,
         voxels: np.ndarray,
-        counted: np.ndarray,
         worth: Callable[[np.ndarray, np.ndarray], np.ndarray],
     ) -> np.ndarray:
         """Return what candidates are worth, counting V only of those that can be worth most.
@@ -214,33 +205,26 @@ class FrontierMap(ABC):
         Args:
             slots: (K,) of the candidates.
             voxels: (K,) int32, theirs.
-            counted: (K,) V·(height factor) in points as counted before, NaN = not yet; filled in.
             worth: (N,) V·(height factor) in points and (N,) indices of candidates → (N,) what these are
                 worth, never less for a greater V.
 
         Returns:
             (K,); -inf for candidates that cannot be worth most.
         """
-        most = np.where(np.isnan(counted), self.upper_bounds(slots), counted)
-        bound, found = worth(most, np.arange(len(slots))), np.full(len(slots), -np.inf)
+        bound = worth(np.minimum(self._bounds[slots], self._most), np.arange(len(slots)))
+        found = np.full(len(slots), -np.inf)
         order = np.argsort(-bound, kind="stable")
-        for first in range(0, len(order), self._batch):
-            batch = order[first : first + self._batch]
+        for first in range(0, len(order), _BATCH):
+            batch = order[first : first + _BATCH]
             if bound[batch[0]] < found.max():
                 break
-            fresh = batch[np.isnan(counted[batch])]
-            counted[fresh] = self.count(slots[fresh], voxels[fresh])
-            found[batch] = worth(counted[batch], batch)
+            found[batch] = worth(self.count(slots[batch], voxels[batch]), batch)
         return found
 
     def listed(self, all_of_them: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Return (K,) slots and (K,) int32 voxels of candidates: all, or those that may see something."""
         slots = np.flatnonzero((self._voxels != NONE) & (all_of_them | (self._bounds > 0.0)))
         return slots, self._voxels[slots]
-
-    def voxels_of(self, slots: np.ndarray | slice) -> np.ndarray:
-        """Return (K,) int32 voxels of the candidates in some slots; NONE = there is none."""
-        return self._voxels[slots]
 
     def promise(self, place: np.ndarray) -> None:
         """Note that a robot will scan at (3,), grid units: it promises to see the points visible there."""

@@ -9,11 +9,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import ndimage
 
-from entropy_explore_env.frontiers.blocks import NONE, UNEXPLORED, replace_unreached
-from entropy_explore_env.frontiers.frontier_map import BATCH_CELLS, FrontierConfig, FrontierMap
-from entropy_explore_env.frontiers.ray_tree import yaws_around
+from entropy_explore_env.frontiers.blocks import replace_unreached
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig, FrontierMap
 from entropy_explore_env.frontiers.terrain_map import (
     fill_column_costs,
     new_terrain_map,
@@ -26,19 +24,16 @@ from entropy_explore_env.frontiers.terrain_visibility import (
     count_below,
     count_columns_from,
     count_columns_in_ball,
-    count_in_range,
     fill_height_factors,
-    half_widths,
     mean_ground,
 )
+from entropy_explore_env.frontiers.visibility import yaws_around
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
 
 PATCH_M = 5.0
 """Half the width of the patch whose mean ground is z_av."""
-TILE = 8
-"""Width in columns of the square tiles by which changes are noted."""
 TOO_HIGH = 0.9
 """Candidates higher above z_av than this share of the range are dropped."""
 
@@ -69,8 +64,7 @@ class TerrainFrontiers(FrontierMap):
             highest=TOO_HIGH * self.reach,
             fade=self.reach if frontiers.unexplored_ground == "falling" else math.inf,
         )
-        self._widths, self.point = half_widths(self.reach), edge**2
-        self._batch = 1 + BATCH_CELLS // max(math.ceil(len(yaws) * self.reach), 1)
+        self.point, self._sight = edge**2, (self.reach + 1.5 * self._model.patch + 2.0, 0.0)
         factor = 1.0 if frontiers.gamma is None else edge * high
         self._most = min(math.pi * (self.reach + 2.0) ** 2, float(x * y)) * factor
 
@@ -90,23 +84,6 @@ class TerrainFrontiers(FrontierMap):
         for block in np.flatnonzero(self._blocks.candidate != before):
             take_column(self._map, block)
         self._forget_bounds()
-
-    def _raise_bounds(self, opened: np.ndarray) -> None:
-        """Forget the bounds of candidates within range; see `FrontierMap`."""
-        slots = np.flatnonzero(self._voxels != NONE)
-        near = tiles_near(self._axes_of(opened), self._size, self.reach + self._model.patch)
-        x, y, _ = (self._axes_of(self._voxels[slots]) // TILE).T
-        self._bounds[slots[near[x, y]]] = math.inf
-
-    def upper_bounds(self, slots: np.ndarray) -> np.ndarray:
-        """See `FrontierMap`; where nothing is counted yet, by the unexplored columns in range."""
-        fresh = slots[np.isinf(self._bounds[slots])]
-        if len(fresh):
-            unexplored = self._blocks.state.reshape(self._size[:2]) & UNEXPLORED
-            sums, found = np.pad(np.cumsum(unexplored, 1, np.int32), ((0, 0), (1, 0))), np.empty(len(fresh))
-            count_in_range(self._map, sums, self._widths, self._voxels[fresh], found)
-            self._bounds[fresh] = found * self._factors(self._voxels[fresh])
-        return super().upper_bounds(slots)
 
     def _counted(self, voxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `FrontierMap`."""
@@ -140,11 +117,3 @@ class TerrainFrontiers(FrontierMap):
         """Return an eye at (3,), grid units, and z_av there."""
         eye = tuple(place.tolist())
         return eye, mean_ground(self._map, int(eye[0]), int(eye[1]), self._model.patch)
-
-
-def tiles_near(places: np.ndarray, size: tuple[int, int, int], reach: float) -> np.ndarray:
-    """Return (X / TILE, Y / TILE) bool, the tiles within reach of (N, 3) indices of voxels."""
-    tiles = np.zeros((size[0] // TILE + 1, size[1] // TILE + 1), bool)
-    tiles[places[:, 0] // TILE, places[:, 1] // TILE] = True
-    wide = math.ceil(min(reach, sum(size)) / TILE)
-    return np.asarray(ndimage.maximum_filter(tiles, 2 * wide + 1, mode="constant"))

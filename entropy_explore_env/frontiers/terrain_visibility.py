@@ -138,28 +138,3 @@ def fill_height_factors(terrain, voxels, model, factors):
         above = height - mean_ground(terrain, x, y, model.patch)
         factor = 1.0 if gamma < 0.0 else max(above, 1e-3) ** gamma * height ** (1.0 - gamma) * model.unit
         factors[place] = 0.0 if above > model.highest else factor
-
-
-def half_widths(reach: float) -> np.ndarray:
-    """Return (W,) int64, how far on along y columns touch a disc of this radius, by their distance along x.
-
-    The disc is about the middle of a column; distances are in columns.
-    """
-    within = reach + math.sqrt(0.5)  # the middle of a column that touches it
-    return np.sqrt(within**2 - np.arange(int(within) + 1) ** 2).astype(np.int64)
-
-
-@lean_kernel
-def count_in_range(terrain, sums, widths, voxels, found):
-    """Fill in (K,) how many unexplored columns are in range of (K,) int32 voxels: no more is seen from there.
-
-    `sums` are (X, Y + 1) int32, the unexplored columns of each row along y before a column; `widths` those of
-    `half_widths` for the sensor's reach.
-    """
-    size, last = terrain.size, len(widths) - 1
-    for place in range(len(voxels)):
-        x, y, _ = grid_index(size, voxels[place])
-        found[place] = 0.0
-        for i in range(max(x - last, 0), min(x + last, size[0] - 1) + 1):
-            wide = widths[abs(i - x)]
-            found[place] += sums[i, min(y + wide + 1, size[1])] - sums[i, max(y - wide, 0)]

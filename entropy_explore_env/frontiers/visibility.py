@@ -7,8 +7,8 @@ weight for the first promise.) The naive V, for comparison, counts all unexplore
 radius is the range.
 
 Counts are pairs: the number of points, and the sum of their weights. Grid units. In all functions `counter`
-is a VisibilityCounter, `state` the (V,) uint8 states of voxels, `size` the voxels along each axis, `tree` a
-RayTree, and `marking` whether one more robot promises to see the points.
+is a VisibilityCounter, `state` the (V,) uint8 states of voxels, `size` the voxels along each axis, and
+`marking` whether one more robot promises to see the points.
 """
 
 from __future__ import annotations
@@ -29,7 +29,11 @@ from entropy_explore_env.belief.raycast import (
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.frontiers.blocks import NONE, UNEXPLORED
+from entropy_explore_env.settings.robot_kind import RobotKind
 
+_MOST_RAYS = 720
+_ROWS = 15
+"""Rows of imagined rays for robots that look up and down."""
 _STOPS_RAYS = 3
 """States above this do."""
 _WEIGHTS = 1.0 / (1.0 + np.arange(256))
@@ -120,73 +124,60 @@ def count_in_ball(counter, state, size, start, reach, marking):
 
 
 @lean_kernel
-def count_from(counter, state, size, voxels, tree, met, seen, weighed):
-    """Count from the centres of (K,) int32 voxels what `count_crossed` finds there, with the rays as a tree.
+def count_from(counter, state, size, voxels, directions, reach, seen, weighed):
+    """Count from the centres of (K,) int32 voxels what `count_crossed` finds there.
 
-    (K,) `seen` and `weighed` are filled in with the numbers of points and the sums of weights; `met` is (C,)
-    int32 scratch space.
+    (K,) `seen` and `weighed` are filled in with the numbers of points and the sums of weights.
     """
-    for cell in range(len(met)):
-        met[cell] = -1
-    promises = counter.promises[0] > 0
     for place in range(len(voxels)):
-        at, inside = grid_index(size, voxels[place]), True
-        for axis in range(3):
-            inside &= at[axis] + tree.low[axis] >= 0 and at[axis] + tree.high[axis] < size[axis]
-        start = at, place
-        if inside and not promises:
-            found = _count_branches(counter, state, size, tree, met, start, True, False)
-        elif inside:
-            found = _count_branches(counter, state, size, tree, met, start, True, True)
-        else:
-            found = _count_branches(counter, state, size, tree, met, start, False, True)
-        seen[place], weighed[place] = found
-
-
-@inlined_kernel
-def _count_branches(counter, state, size, tree, met, start, inside, promises):
-    """Count along the tree's branches from a voxel, the `start`: its indices, and its number in the call.
-
-    With `inside` no ray leaves the workspace, and without `promises` all weights are 1: constants, both of
-    which save time.
-    """
-    at, place = start
-    voxel = np.int64(flat_index(size, at[0], at[1], at[2]))
-    points, weighed, node = 0, 0.0, np.uint32(0)
-    while node < np.uint32(len(tree.after)):
-        if not inside:
-            x, y, z = at[0] + tree.steps[node, 0], at[1] + tree.steps[node, 1], at[2] + tree.steps[node, 2]
-            if not (0 <= x < size[0] and 0 <= y < size[1] and 0 <= z < size[2]):
-                node = tree.after[node]
-                continue
-        there, cell = np.uint64(voxel + tree.offset[node]), tree.cell[node]
-        flags = state[there]
-        fresh = (flags & UNEXPLORED != 0) & (met[cell] != place)
-        met[cell] = place
-        points += np.int64(fresh)
-        if promises and fresh:
-            weighed += _WEIGHTS[counter.promised[there]]
-        if flags > _STOPS_RAYS and node > 0:
-            node = tree.after[node]
-        else:
-            node += np.uint32(1)
-    return points, weighed if promises else float(points)
+        x, y, z = grid_index(size, voxels[place])
+        start = (x + 0.5, y + 0.5, z + 0.5)
+        seen[place], weighed[place] = count_crossed(counter, state, size, start, directions, reach, False)
 
 
 @lean_kernel
-def raise_bounds(size, opened, voxels, tree, bounds):
-    """Raise upper bounds of what is seen from voxels by what may become visible past (N,) int32 opened ones.
+def forget_in_range(size, opened, voxels, sight, bounds):
+    """Set the (K,) bounds of (K,) int32 voxels in sight of (N,) int32 opened ones to inf; NONE = no voxel.
 
-    (K,) float64 `bounds` belong to (K,) int32 `voxels`, NONE = no voxel, and were counted with this tree. A
-    bound of inf is unknown, and stays so.
+    `sight` is a radius in voxel edges, and the weight of distances along z, 0 or 1.
     """
-    wide = tree.behind.shape
+    radius, upright = sight
     for place in range(len(voxels)):
         if voxels[place] == NONE or math.isinf(bounds[place]):
             continue
         at = grid_index(size, voxels[place])
         for other in opened:
             x, y, z = grid_index(size, other)
-            i, j, k = x - at[0] + wide[0] // 2, y - at[1] + wide[1] // 2, z - at[2] + wide[2] // 2
-            if 0 <= i < wide[0] and 0 <= j < wide[1] and 0 <= k < wide[2]:
-                bounds[place] += tree.behind[i, j, k]
+            dx, dy, dz = x - at[0], y - at[1], (z - at[2]) * upright
+            if dx * dx + dy * dy + dz * dz <= radius * radius:
+                bounds[place] = math.inf
+                break
+
+
+def imagined_pitches(kind: RobotKind, flies: bool) -> np.ndarray:
+    """Return (rows,) pitches of imagined rays: all of them for flying robots, else the sensor's."""
+    tilt = kind.sensor.field_of_view_rad[1]
+    if flies:
+        return (np.arange(_ROWS) + 0.5) * (math.pi / _ROWS) - math.pi / 2
+    rows = min(kind.sensor.rows, _ROWS)
+    return np.linspace(-tilt / 2, tilt / 2, rows) if rows > 1 else np.zeros(1)
+
+
+def yaws_around(reach: float, most: int = _MOST_RAYS) -> np.ndarray:
+    """Return (D,) yaws all around, one for every voxel edge at `reach`, at most `most`."""
+    turns = min(math.ceil(2.0 * math.pi * min(reach, 1e4)), most)
+    return (np.arange(turns) + 0.5) * (2.0 * math.pi / turns)
+
+
+def rays_around(reach: float, pitches: np.ndarray) -> np.ndarray:
+    """Return (D, 3) float64 unit vectors all around; with more than one pitch at most 32 to a turn."""
+    return rays_towards(yaws_around(reach, _MOST_RAYS if len(pitches) == 1 else 32), pitches)
+
+
+def rays_towards(yaws: np.ndarray, pitches: np.ndarray) -> np.ndarray:
+    """Return (…, D, 3) float64 unit vectors of all pairs of (…, N) yaws and (…, M) pitches, radians."""
+    yaw, pitch = yaws[..., :, np.newaxis], pitches[..., np.newaxis, :]
+    level = np.cos(pitch)
+    axes = np.broadcast_arrays(np.cos(yaw) * level, np.sin(yaw) * level, -np.sin(pitch))
+    rays = np.stack(axes, axis=-1)
+    return rays.reshape(*rays.shape[:-3], -1, 3)

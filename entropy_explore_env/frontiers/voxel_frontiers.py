@@ -25,12 +25,17 @@ from entropy_explore_env.frontiers.blocks import (
     new_blocks,
     replace_unreached,
 )
-from entropy_explore_env.frontiers.frontier_map import BATCH_CELLS, FrontierConfig, FrontierMap
-from entropy_explore_env.frontiers.ray_tree import grow_tree, imagined_pitches, rays_around, rays_towards
-from entropy_explore_env.frontiers.visibility import count_crossed, count_from, count_in_ball, raise_bounds
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig, FrontierMap
+from entropy_explore_env.frontiers.visibility import (
+    count_crossed,
+    count_from,
+    count_in_ball,
+    imagined_pitches,
+    rays_around,
+    rays_towards,
+)
 from entropy_explore_env.frontiers.voxel_map import (
     body_footprint,
-    collect_candidates,
     count_connected,
     fill_nearest,
     first_viewing_place,
@@ -46,8 +51,6 @@ from entropy_explore_env.settings.scenario import Scenario
 
 BLOCK = 4
 """Voxels along the edge of a block, unless settings say otherwise."""
-_MOST_OPENED = 256
-"""Where more voxels turned free, or are unexplored again, counting anew is as fast as raising bounds."""
 
 
 class VoxelFrontiers(FrontierMap):
@@ -65,15 +68,12 @@ class VoxelFrontiers(FrontierMap):
         self._start(scenario.grid.voxels)
         self._pitches = imagined_pitches(kind, layer is None)
         self._rays = rays_around(self.reach, self._pitches)
-        self._tree = grow_tree(self._rays, self.reach, self._size)
-        self._met = np.empty(self._tree.cells, np.int32)
         self._gaze_pitches = (0.0, -0.7, 0.7) if layer is None else (0.0,)
-        self._batch = 1 + BATCH_CELLS // len(self._tree.after)
         self.point = edge ** (2 if scenario.grid.flat else 3)
         wide = self.reach + 2.0
         ball = math.pi * wide**2 if self._size[2] == 1 else 4.0 / 3.0 * math.pi * wide**3
         self._most = min(ball, float(scenario.grid.voxels))
-        self._radius = self.body_reach + 2
+        self._radius, self._sight = self.body_reach + 2, (self.reach + 2.0, 1.0)
         self._dropped: dict[int, tuple[bytes, np.ndarray]] = {}
         """Voxel → what its surroundings were when it was dropped, and which edges were dropped with it."""
 
@@ -97,21 +97,14 @@ class VoxelFrontiers(FrontierMap):
         replace_unreached(self._blocks, cost)
         self._forget_bounds()
 
-    def _raise_bounds(self, opened: np.ndarray) -> None:
-        """See `FrontierMap`."""
-        if self._naive or len(opened) > _MOST_OPENED:
-            self._bounds[:] = math.inf
-        else:
-            raise_bounds(self._size, opened, self._voxels, self._tree, self._bounds)
-
     def gains(self, voxels: np.ndarray) -> np.ndarray:
         """Return (K,) how many unknown voxels the sensor would see, all around, from (K,) int32 voxels."""
         return self._counted(voxels)[0]
 
     def _count_from(self, voxels: np.ndarray, seen: np.ndarray, weighed: np.ndarray) -> None:
         """See `FrontierMap`."""
-        arrays = self._counter, self._states.state, self._size, voxels, self._tree
-        count_from(*arrays, self._met, seen, weighed)
+        arrays = self._counter, self._states.state, self._size, voxels, self._rays
+        count_from(*arrays, self.reach, seen, weighed)
 
     def _count_rays(self, place: np.ndarray, rays: np.ndarray, marking: bool) -> tuple[int, float]:
         """See `FrontierMap`."""
@@ -184,12 +177,9 @@ class VoxelFrontiers(FrontierMap):
         Returns:
             (K,) int32 voxels and (K,) float64 lengths in voxel edges, in the order of the blocks.
         """
-        blocks = np.flatnonzero(self._voxels != NONE)
-        most = len(blocks) * math.prod(self._blocks.across)
-        cells, of_block = np.empty(most, np.int32), np.empty(most, np.int64)
-        count = collect_candidates(self._blocks, blocks, cells, of_block)
-        cells, of_block = cells[:count], of_block[:count]
-        lengths, nearest = lengths_to(cells), np.full(len(blocks), NONE)
+        cells = np.flatnonzero(self._marks & CANDIDATE).astype(np.int32)
+        of_block = np.ravel_multi_index((self._axes_of(cells) // self._blocks.across).T, self._blocks.blocks)
+        lengths, nearest = lengths_to(cells), np.full(len(self._voxels), NONE)
         fill_nearest(lengths, of_block, reach, nearest)
         nearest = nearest[nearest != NONE]
         return cells[nearest], lengths[nearest]

@@ -16,7 +16,6 @@ from entropy_explore_env.belief.raycast import OPEN, Line, cast_range
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.frontiers.blocks import (
-    CANDIDATE,
     COVERED,
     DROPPED,
     EDGE,
@@ -92,25 +91,6 @@ def _may_stand(blocks, x, y, z):
         if near == NONE or blocks.state[near] & (UNMAPPED | COVERED):
             return False
     return True
-
-
-@lean_kernel
-def collect_candidates(blocks, listed, found, of_block):
-    """Fill in all candidates of (K,) int64 listed blocks one after the other; return how many there are.
-
-    `found` are (N,) int32 voxels, `of_block` (N,) int64 each one's block, as an index in `listed`.
-    """
-    count = 0
-    for place in range(len(listed)):
-        low, high = block_span(blocks, listed[place])
-        for x in range(low[0], high[0]):
-            for y in range(low[1], high[1]):
-                for z in range(low[2], high[2]):
-                    voxel = flat_index(blocks.size, x, y, z)
-                    if blocks.flags[voxel] & CANDIDATE:
-                        found[count], of_block[count] = voxel, place
-                        count += 1
-    return count
 
 
 @lean_kernel

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.frontiers.blocks import NONE, UNEXPLORED, mark_around, replace_unreached
-from entropy_explore_env.frontiers.terrain_frontiers import tiles_near
+from entropy_explore_env.frontiers.blocks import NONE, mark_around, replace_unreached
 from entropy_explore_env.frontiers.terrain_map import (
     fill_column_costs,
     new_terrain_map,
@@ -23,9 +22,7 @@ from entropy_explore_env.frontiers.terrain_visibility import (
     count_below,
     count_columns_from,
     count_columns_in_ball,
-    count_in_range,
     fill_height_factors,
-    half_widths,
     mean_ground,
 )
 from entropy_explore_env.frontiers.visibility import new_counter
@@ -185,32 +182,3 @@ def test_the_height_factor_by_hand():
     east = np.array([[1.0, 0.0]])
     count_columns_from(counter, terrain, voxels, east, view_model, seen, weighed)
     assert seen.tolist() == weighed.tolist() == [1.0, 2.0]  # from 3.5 it ends on the line over the edge
-
-
-@given(seeds, st.floats(0.6, 12.0))
-@drawn(60)
-def test_no_more_is_seen_than_lies_in_range(seed, reach):
-    ground, rng = hills(seed)
-    terrain = known_ground(ground)
-    voxels = rng.integers(0, math.prod(SHAPE), 20).astype(np.int32)
-    angles = 0.05 + np.arange(40) * (2 * math.pi / 40)
-    azimuths = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    view_model, counter = ViewModel(reach, 0.0, 2, -1.0, 1.0, 5.0, reach), new_counter(9 * 13, SHAPE)
-    seen, weighed, most = np.empty((3, 20))
-    unexplored = terrain.columns.state.reshape(9, 13) & UNEXPLORED
-    sums = np.pad(np.cumsum(unexplored, 1, np.int32), ((0, 0), (1, 0)))
-    count_columns_from(counter, terrain, voxels, azimuths, view_model, seen, weighed)
-    count_in_range(terrain, sums, half_widths(reach), voxels, most)
-    assert (seen <= most).all()
-    for voxel, bound in zip(voxels.tolist(), most, strict=True):
-        x, y, _ = np.unravel_index(voxel, SHAPE)
-        near = [math.dist((x, y), place) <= reach + math.sqrt(0.5) for place in np.ndindex(9, 13)]
-        assert bound == np.count_nonzero(np.reshape(near, (9, 13)) & (terrain.ground == NONE))
-
-
-def test_tiles_within_reach_of_a_change_are_those_near_it():
-    near = tiles_near(np.array([[0, 0, 3]]), (40, 30, 8), 5.0)
-    assert near[:2, :2].all() and near.sum() == 4
-    near = tiles_near(np.array([[17, 9, 3], [39, 29, 0]]), (40, 30, 8), 1.0)
-    assert near[1:4, 0:3].all() and near[3:, 2:].all() and near.sum() == 14
-    assert tiles_near(np.array([[17, 9, 3]]), (40, 30, 8), 100.0).all()

@@ -46,5 +46,4 @@ class InformationGain(FrontierRule):
         def worth(gains: np.ndarray, which: np.ndarray) -> np.ndarray:
             return np.asarray(weight * np.log1p(gains) - lengths[which])
 
-        uncounted = np.full(len(voxels), np.nan)
-        return best_of(voxels, scene.cells.worths(slots, voxels, uncounted, worth), scene.target)
+        return best_of(voxels, scene.cells.worths(slots, voxels, worth), scene.target)
