@@ -104,11 +104,6 @@ _PAPER = (
         _TEAM_SUITES,
     ),
     Entry(
-        "voronoi-gradient",
-        partial(VoronoiCoverage, "gradient-search"),
-        "the same cells, one step down the coverage functional's gradient (Bhattacharya, eq. 3)",
-    ),
-    Entry(
         "next-best-view",
         NextBestView,
         "argmax (NI - w_d d - w_LE LE)(1 - P_occ) over poses in known free space, NI new information, LE how "
@@ -134,11 +129,6 @@ _PAPER = (
         "raster",
         Raster,
         "the next place in row order, looking in all directions (Sujan, method (ii))",
-    ),
-    Entry(
-        "raster-fixed-yaw",
-        partial(Raster, turning=False),
-        "the next place in row order, looking in one direction (Sujan, method (ii))",
     ),
     Entry(
         "per-time-visibility",

@@ -1,7 +1,7 @@
 """The strategy `raster` (Sujan, sect. 3.1, method ii): places of a lattice, row by row, as they become known.
 
 A robot takes the next place in row order that can be reached and that it has not scanned from. It looks in
-all directions there, or (`raster-fixed-yaw`) along x alone. Robots do not coordinate.
+all directions there. Robots do not coordinate.
 
 Ours, where the paper says nothing: places lie half a sensor range apart; with a sensor without range limit, a
 twentieth of the workspace's longest side. A view that is narrower than 0.1 rad counts as 0.1 rad wide.
@@ -77,14 +77,10 @@ class Raster(FrontierRule):
     rule = "raster"
     until_reached, refines, turns_first = True, False, False
 
-    def __init__(self, turning: bool = True) -> None:
-        """Take whether robots look in all directions from each place, or always along x."""
-        self._turning = turning
-
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
         super().reset(scenario, rng)
-        self._scans = [RasterScan(self._turning) for _ in range(scenario.robots)]
+        self._scans = [RasterScan(turning=True) for _ in range(scenario.robots)]
 
     def pick(self, scene: Scene) -> Goal:
         """Return the next place and gaze; see `FrontierRule`."""

@@ -7,9 +7,8 @@ Each robot divides its own belief among the team, by the positions at which it l
 costs the entropy along it, and φ is the entropy, no less than τ′. The robot goes to the target in its own
 cell. A centralised team is the same code with perfect messages.
 
-`voronoi-gradient` takes steps down the coverage functional (eq. 3) and falls back on the projected centroid
-where none helps and the cell is not explored. `voronoi-nearest`, ours, goes to the uncertain voxel that costs
-least; by length, and a voxel is certain when its deviation has fallen to the mission's σ_end.
+`voronoi-nearest`, ours, goes to the uncertain voxel that costs least; by length, and a voxel is certain when
+its deviation has fallen to the mission's σ_end.
 
 Once all is explored the projected centroid may lead robots in circles, as on a known map in the paper's
 reproduction. Its guard (`Rules.guarded`) is not part of this strategy, since missions end by then.
@@ -21,7 +20,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from baselines.strategies.voronoi.controls import CellFunctional, nearest_uncertain, projected_centroid
+from baselines.strategies.voronoi.controls import nearest_uncertain, projected_centroid
 from baselines.strategies.voronoi.territory import Territory
 from entropy_explore_env.belief.paths.geodesic_cells import UNREACHED
 from entropy_explore_env.errors import SettingError
@@ -30,11 +29,9 @@ from entropy_explore_env.planner.driver import Driver
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.scenario import Scenario
 
-Control = Literal["projected-centroid", "gradient-search", "nearest"]
+Control = Literal["projected-centroid", "nearest"]
 _LENGTH_COST = 0.01
 """η, cost of a voxel edge of path in addition to its entropy."""
-_STEPS = 5
-"""Steps of the gradient search per decision."""
 _UNCERTAIN, _LEAST = 0.35, 0.33
 """τ and τ′ in nats: voxels with at least the first are uncertain, and no density is less than the second."""
 _NEAREST_UNCERTAIN, _NEAREST_LEAST = 0.02, 0.01
@@ -83,39 +80,21 @@ class VoronoiCoverage(Driver):
         entropy, cost = land.entropy.reshape(-1), land.traversal_cost.reshape(-1)
         leads = len(path) > 0 and not np.isinf(cost[path]).any()
         if not leads or (self._to_see[view.robot] and entropy[path[-1]] < self._tau):
-            path, by_steps = self._path_to_target(view, here)
-            uncertain = len(path) > 0 and bool(entropy[path[-1]] >= self._tau)
-            self._to_see[view.robot] = uncertain and not by_steps
+            path = self._path_to_target(view, here)
+            self._to_see[view.robot] = len(path) > 0 and bool(entropy[path[-1]] >= self._tau)
         self._paths[view.robot] = path
         return land.viewpoint_on(view, path)
 
-    def _path_to_target(self, view: RobotKnowledge, here: int) -> tuple[np.ndarray, bool]:
-        """Return the voxels (N,) of the path in the robot's own cell, and whether it goes down by steps."""
+    def _path_to_target(self, view: RobotKnowledge, here: int) -> np.ndarray:
+        """Return the voxels (N,) of the path in the robot's own cell."""
         land = self._territory
         density = np.maximum(land.entropy, np.float32(self._floor))
         cell = land.divide(view, here)
         if not (density[land.space.cells != UNREACHED] >= self._tau).any():
             cell = land.divide(view, here, explored=True)
         own = len(cell) > 0 and bool(density.reshape(-1)[cell].max() >= self._tau)
-        if self._control == "gradient-search":
-            path = self._descent(cell, density, here)
-            if len(path) > 0 or not own:
-                return path, True
         if own and self._control == "nearest":
             target = nearest_uncertain(cell, land.space.costs, density, self._tau)
         else:
             target = projected_centroid(cell, density, self._tau)
-        return np.zeros(0, np.int64) if target == UNREACHED else land.path_to(target), False
-
-    def _descent(self, cell: np.ndarray, density: np.ndarray, here: int) -> np.ndarray:
-        """Return the voxels (N,) of the steps of a gradient search; none if no neighbour is better."""
-        inside, path, land = np.zeros(density.shape, bool), list[int](), self._territory
-        inside.reshape(-1)[cell] = True
-        functional = CellFunctional(land.inner, land.traversal_cost, density, inside, land.metric)
-        for _ in range(_STEPS if len(cell) else 0):
-            step = functional.step(here)
-            if step == here:
-                break
-            path.append(step)
-            here = step
-        return np.array(path, np.int64)
+        return np.zeros(0, np.int64) if target == UNREACHED else land.path_to(target)

@@ -13,8 +13,8 @@ from scipy import ndimage
 
 from entropy_explore_env.belief.entropy import LN2, fill_occupancy_entropy
 from entropy_explore_env.belief.paths.geodesic_cells import extract_path, new_tessellation, tessellate
+from entropy_explore_env.belief.paths.lattice import Lattice
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
-from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.frontiers.knowledge import belief_of, centres_of, teammates_that_share, voxel_of
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.scenario import Scenario
@@ -41,7 +41,6 @@ class Territory:
         traversal_cost: (X, Y, Z) float32; inf where the body does not fit.
         metric: `length_cost` and `by_length` of `tessellate`, of the latest division.
         space: The latest division.
-        inner: Memory for tessellations of one cell.
     """
 
     def __init__(self, scenario: Scenario, length_cost: float, by_length: bool) -> None:
@@ -57,23 +56,21 @@ class Territory:
         self._exploring = (0.0, True) if by_length else (length_cost, False)
         self._models = [robot_model(scenario, kind) for kind in scenario.kinds]
         self._scratch = new_scratch(scenario.grid, self._models)
-        self.space, self.inner, self.metric = new_tessellation(shape), new_tessellation(shape), (0.0, True)
+        self.space, self.metric = new_tessellation(shape), (0.0, True)
         self.entropy, self.traversal_cost = np.empty(shape, np.float32), np.empty(shape, np.float32)
 
     def observe(self, view: RobotKnowledge, here: int) -> None:
         """Bring entropies and costs up to date with the belief of a robot that stands in a voxel."""
-        field = np.empty(self.entropy.shape, np.float32)
-        out, mean, precision = field.reshape(-1), view.mean.reshape(-1), view.precision.reshape(-1)
         if self._exploring[1]:
             prior, end = view.scenario.sigma_prior**-2, view.scenario.ending.sigma_end**-2
-            fill_deviation_entropy(precision, prior, end, out)
+            field = deviation_entropy(view.precision, prior, end)
         else:
-            fill_occupancy_entropy(mean, precision, out)
+            field = np.empty(self.entropy.shape, np.float32)
+            fill_occupancy_entropy(view.mean.reshape(-1), view.precision.reshape(-1), field.reshape(-1))
         self.entropy = filtered(field)
         cost = np.ones(field.shape, np.float32) if self._exploring[1] else self.entropy.copy()
-        lattice = self._model_of(view).lattice
-        x, y, z = (int(i) for i in np.unravel_index(here, field.shape))
-        inflate_obstacles(view.mean, lattice.footprint, lattice.margin, lattice.layer, (x, y, z), cost)
+        start = tuple(int(i) for i in np.unravel_index(here, field.shape))
+        inflate_obstacles(view.mean, self._model_of(view).lattice, start, cost)
         self.traversal_cost = cost
 
     def divide(self, view: RobotKnowledge, here: int, explored: bool = False) -> np.ndarray:
@@ -139,18 +136,13 @@ class Territory:
         return self._models[view.robot % len(self._models)]
 
 
-@lean_kernel
-def fill_deviation_entropy(
-    precision: np.ndarray, prior_precision: float, end_precision: float, entropy: np.ndarray
-) -> None:
-    """Fill (V,) float32: ln 2 at the prior, 0 from the end's precision on, linear in log σ between them.
+def deviation_entropy(precision: np.ndarray, prior_precision: float, end_precision: float) -> np.ndarray:
+    """Return float32 entropies: ln 2 at the prior, 0 from the end's precision on, linear in log σ between.
 
     Rocha04's missions ask for this: a voxel is known when its standard deviation is σ_end.
     """
-    scale = LN2 / math.log(end_precision / prior_precision)
-    for voxel in range(len(precision)):
-        missing = math.log(end_precision / np.float64(precision[voxel])) * scale
-        entropy[voxel] = min(max(missing, 0.0), LN2)
+    missing = np.log(end_precision / precision.astype(np.float64)) / math.log(end_precision / prior_precision)
+    return np.asarray(np.clip(LN2 * missing, 0.0, LN2), np.float32)
 
 
 def filtered(entropy: np.ndarray) -> np.ndarray:
@@ -158,43 +150,33 @@ def filtered(entropy: np.ndarray) -> np.ndarray:
     return ndimage.minimum_filter(entropy, size=[3 if n > 1 else 1 for n in entropy.shape], mode="nearest")
 
 
-@lean_kernel
 def inflate_obstacles(
-    mean: np.ndarray,
-    footprint: np.ndarray,
-    margin: tuple[int, int, int],
-    layer: int,
-    start: tuple[int, int, int],
-    traversal_cost: np.ndarray,
+    mean: np.ndarray, lattice: Lattice, start: tuple[int, ...], traversal_cost: np.ndarray
 ) -> None:
     """Make the voxels impassable in which a body does not fit, except for its way out from where it starts.
 
     Args:
         mean: (X, Y, Z) float32, expected coverage; above ½ a voxel is an obstacle.
-        footprint: (B, 3) int64 index offsets of the voxels that the body touches; empty = its own only.
-        margin: Layers at either end of each axis in which the body would touch the boundary.
-        layer: The only one that can be entered; -1 = all.
+        lattice: Of the body.
         start: Indices of the robot's voxel.
         traversal_cost: (X, Y, Z) float32, set to inf there.
     """
-    size_x, size_y, size_z = mean.shape
-    for x in range(size_x):
-        for y in range(size_y):
-            for z in range(size_z):
-                outside = x < margin[0] or y < margin[1] or z < margin[2]
-                outside = outside or x >= size_x - margin[0] or y >= size_y - margin[1]
-                if outside or z >= size_z - margin[2] or (layer >= 0 and z != layer):
-                    traversal_cost[x, y, z] = math.inf
-                if mean[x, y, z] > STOP_AT_COVERED:
-                    traversal_cost[x, y, z] = math.inf
-                    for offset in footprint:
-                        i, j, k = x - offset[0], y - offset[1], z - offset[2]
-                        if 0 <= i < size_x and 0 <= j < size_y and 0 <= k < size_z:
-                            traversal_cost[i, j, k] = math.inf
-    if math.isinf(traversal_cost[start[0], start[1], start[2]]):
-        for offset in footprint:
-            i, j, k = start[0] + offset[0], start[1] + offset[1], start[2] + offset[2]
-            if 0 <= i < size_x and 0 <= j < size_y and 0 <= k < size_z and (layer < 0 or k == layer):
-                if mean[i, j, k] <= STOP_AT_COVERED:
-                    traversal_cost[i, j, k] = LN2
-        traversal_cost[start[0], start[1], start[2]] = LN2
+    shape, covered = np.array(mean.shape), mean > STOP_AT_COVERED
+    body = np.concatenate([np.zeros((1, 3), np.int64), lattice.footprint])
+    wide = np.abs(body).max(axis=0)
+    touched = np.zeros(2 * wide + 1, bool)
+    touched[tuple((body + wide).T)] = True
+    layers = slice(None) if lattice.layer < 0 else slice(lattice.layer, lattice.layer + 1)
+    inside = np.zeros(mean.shape, bool)
+    inside[tuple(slice(near, size - near) for near, size in zip(lattice.margin, shape, strict=True))] = True
+    blocked = np.asarray(ndimage.binary_dilation(covered, touched), bool)
+    fits = np.zeros(mean.shape, bool)
+    fits[:, :, layers] = (inside & ~blocked)[:, :, layers]
+    traversal_cost[~fits] = np.inf
+    if not fits[start]:
+        out = np.array(start) + lattice.footprint
+        out = out[
+            ((out >= 0) & (out < shape)).all(axis=1) & ((lattice.layer < 0) | (out[:, 2] == lattice.layer))
+        ]
+        traversal_cost[tuple(out[~covered[tuple(out.T)]].T)] = LN2
+        traversal_cost[start] = LN2

@@ -47,7 +47,7 @@ def test_each_rule_takes_the_pose_that_is_best_by_its_own_measure(monkeypatch, r
 
 
 @pytest.mark.parametrize(
-    "name", ["next-best-view", "most-unmapped", "least-mapped", "random-known", "raster", "raster-fixed-yaw"]
+    "name", ["next-best-view", "most-unmapped", "least-mapped", "random-known", "raster"]
 )
 def test_every_method_maps_with_and_without_a_reach_and_with_a_teammate(name):
     for settings in ({}, {"robot": {"reach_m": math.inf}}, {"robots": 2}):
