@@ -10,15 +10,12 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.papers.sawhney.mission import explore_until_done
-from baselines.strategies.allocation import Allocator, Choice, seconds_of
-from baselines.strategies.metrics import Coordinated, ExplorationConfig, Metric, Nearest, Options
-from baselines.strategies.rules import per_time_visibility
-from baselines.strategies.rules.coordinated_frontier import taken
+from baselines.strategies.metrics import Coordinated, ExplorationConfig, Metric, Nearest
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.blocks import COVERED, NONE
-from entropy_explore_env.frontiers.frontier_map import FrontierConfig
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig, FrontierMap
 from entropy_explore_env.frontiers.terrain_frontiers import TerrainFrontiers
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.missions.records import MissionEnd
@@ -66,25 +63,9 @@ def small_terrain(**settings):
     return with_settings(base, {**changes, **settings})
 
 
-class Eager(Allocator):
-    """Searches paths to all candidates, and counts V of each."""
-
-    def _best_listed(self, robot, targets):
-        self._search(robot, math.inf)
-        slots, voxels = self._candidates.listed(all_of_them=True)
-        edges = self._lengths[robot].edges[slots]
-        reached = np.isfinite(edges)
-        slots, voxels, edges = slots[reached], voxels[reached], edges[reached]
-        seen = self._candidates.count(slots, voxels) * self._candidates.point
-        seconds, takes = seconds_of(self._view.scenario, robot, edges), np.zeros(len(voxels))
-        for target in targets:
-            takes += taken(self._centres(voxels), target[:3], self._candidates.reach)
-        value = self._value(Options(seen, seconds, edges, takes))
-        value = np.where(seen > 0.0, value, -math.inf)
-        best = int(np.argmax(value)) if len(value) else -1
-        if best < 0 or value[best] == -math.inf:
-            return None
-        return Choice(int(voxels[best]), float(value[best]), float(seconds[best]))
+def eagerly(self, slots, voxels, worth):
+    """`FrontierMap.worths` that counts V of each candidate."""
+    return worth(self.count(slots, voxels), np.arange(len(slots)))
 
 
 class Noting(PerTimeVisibility):
@@ -125,7 +106,7 @@ def check_lazily_is_as_eagerly(monkeypatch, scenario, seed, **settings):
         monkeypatch.setattr(kind, "count", counting(kind.count, counted))
     _, lazy, done = explored(scenario, seed, **settings)
     lazily = sum(counted)
-    monkeypatch.setattr(per_time_visibility, "Allocator", Eager)
+    monkeypatch.setattr(FrontierMap, "worths", eagerly)
     _, _, same = explored(scenario, seed, **settings)
     assert done == same and lazily < sum(counted) - lazily
     return lazy, done
