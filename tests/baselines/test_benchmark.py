@@ -18,13 +18,12 @@ from baselines import benchmark, strategies
 from baselines.benchmark import chosen_strategies
 from baselines.cli.arguments import run_command
 from baselines.experiments import trials
-from baselines.experiments.mission import SuiteMission, rounded, run_mission, scripted
+from baselines.experiments.mission import rounded, run_mission, scripted
 from baselines.experiments.rows import read_table
 from baselines.strategies import make_strategy
 from baselines.strategies.rules.random_walk import RandomWalk
 from benchmarks.proofs.kills import contents
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.json import settings_of
@@ -252,14 +251,6 @@ def test_the_reference_is_always_there_and_first():
     assert chosen_strategies("gradient", "faults") == ("gradient",)
 
 
-def test_a_suite_says_who_stands_in_its_table():
-    plans, volumes = chosen_strategies(None, "plans"), chosen_strategies(None, "volumes")
-    assert plans[0] == volumes[0] == "nearest-frontier"
-    assert {"tour", "planned-rate"} <= set(plans) and "voronoi" in volumes and "voronoi" not in plans
-    with pytest.raises(SettingError, match="suite = 'plan'"):
-        chosen_strategies(None, "plan")
-
-
 def test_the_page_of_a_file_does_not_say_where_it_lies(tmp_path):
     image = Image.fromarray(np.full((30, 44), 254, np.uint8))
     path = tmp_path / "a plan.png"
@@ -270,17 +261,6 @@ def test_the_page_of_a_file_does_not_say_where_it_lies(tmp_path):
     page = (tmp_path / "out" / "own.md").read_text()
     assert "--world 'a plan.png'" in page and "world file `a plan.png`, " in page
     assert str(tmp_path) not in page and "1 ground robot" in page
-
-
-def test_what_a_record_says_of_the_clock_is_its_own(monkeypatch):
-    ticks = iter(range(10**6))
-    monkeypatch.setattr("baselines.experiments.mission.time.perf_counter", lambda: float(next(ticks)))
-    env = EntropyExploreEnv(
-        scripted(with_settings(BOX, {"track_truth": True, "robots": 1, "time_limit_s": 9.0}))
-    )
-    record = SuiteMission()(env, "random", 0)
-    assert record["clock"]["decision_ms"] == 1000.0  # a tick a decision
-    assert record["clock"]["mission_s"] >= 2 * 3 and "per_robot" not in record
 
 
 @pytest.mark.parametrize(

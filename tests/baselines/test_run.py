@@ -18,33 +18,14 @@ from baselines.cli.progress import standing_still
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import ALIASES, STRATEGIES, make_strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.mission_record import load_record
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import BOX
-from tests.baselines.ran import FILES, SHORT, Ran, check_refused, without_clock
+from tests.baselines.ran import FILES, SHORT, check_refused, without_clock
 from tests.systems import needs_posix
 
 ROOT = Path(__file__).parents[2]
-NAMED = (
-    "scenario",
-    "strategy",
-    "robots",
-    "seed",
-    "finished",
-    "end_reason",
-    "t_mission_s",
-    "scans",
-    "measurements",
-    "shared_measurements",
-    "entropy_start_bits",
-    "entropy_end_bits",
-    "distance_m",
-    "blocked_moves",
-    "wall_s",
-)
-"""Keys that the README promises."""
 
 
 # --- results
@@ -52,7 +33,6 @@ NAMED = (
 
 def test_json_is_one_object_with_every_key_and_the_mission_s_own_figures(figures):
     printed = figures("--strategy", "random", "--seed", "4")
-    assert set(NAMED) <= set(printed)
     env = EntropyExploreEnv(with_settings(scripted(BOX), {"track_truth": True}))
     run_mission(env, make_strategy("random"), 4)
     expected = {"strategy": "random", **mission_figures(env.missions, 0, floor=True)}
@@ -62,12 +42,6 @@ def test_json_is_one_object_with_every_key_and_the_mission_s_own_figures(figures
     assert printed["entropy_end_bits"] <= printed["entropy_threshold_bits"] < printed["entropy_start_bits"]
     assert 0 < printed["shared_measurements"] < printed["measurements"] <= 28 * printed["scans"]
     assert 0.0 < printed["wall_s"] < 60.0
-
-
-def test_the_same_seed_gives_the_same_figures_but_for_the_wall_clock(figures):
-    first, again, other = (figures("--seed", seed) for seed in ("3", "3", "4"))
-    assert without_clock(first) == without_clock(again)
-    assert without_clock(first) != without_clock(other)
 
 
 @pytest.mark.parametrize("name", ALIASES)
@@ -88,23 +62,10 @@ def test_the_table_warns_of_robots_that_have_hardly_moved():
     assert of(False, (0.0, 0), scans=9) == []
 
 
-def test_what_is_not_said_is_the_scenario_s_own(figures):
-    said = (
-        "--robots 2 --strategy gradient --seed 0 --channel.burst 8 --channel.i-min-bits 0.1 "
-        "--robot.reach-m 1 --robot.max-speed-m-s 0.5 --ending.time-limit-s 10000"
-    )
-    assert without_clock(figures(*said.split())) == without_clock(figures())
-
-
 @pytest.mark.parametrize(
     "options",
     [
-        "--json",
-        "--strategy random",
-        "--json --strategy random --seed 3",
-        "--seed=3",
-        "--channel.no-announcements",
-        "--no-json",
+        "--json --strategy random --seed=3",
         "--channel.no_announcements",
     ],
 )
@@ -114,18 +75,6 @@ def test_options_may_stand_before_the_scenario(options, command):
         for words in ([*options.split(), "box-7x11x5"], ["box-7x11x5", *options.split()])
     )
     assert before == after
-
-
-def test_channel_options_change_the_result(figures):
-    usual = figures()
-    alone = figures("--channel.burst", "0")
-    assert alone["shared_measurements"] == 0 < usual["shared_measurements"]
-    assert all(robot["measurements_received"] == 0 for robot in alone["per_robot"])
-    assert figures("--channel.i-min-bits", "1000")["shared_measurements"] == 0
-    lossy = figures("--channel.loss-probability", "1")
-    assert lossy["shared_measurements"] > 0 and lossy["messages_lost"] > 0
-    assert all(robot["measurements_received"] == 0 for robot in lossy["per_robot"])
-    assert figures("--channel.burst", "3")["shared_measurements"] < usual["shared_measurements"]
 
 
 def test_team_strategy_and_ending_can_be_said(figures):
@@ -167,22 +116,13 @@ def test_the_table_leaves_out_what_means_nothing(command):
         (["box-7x11x5", "--frobnicate", "3"], ["--frobnicate"]),
         (["box-7x11x5", "more"], ["more"]),
         (["box-7x11x5", "--robots", "two"], ["--robots", "two"]),
-        (["box-7x11x5", "--robots", "1.5"], ["--robots", "1.5"]),
         (["box-7x11x5", "--robots"], ["--robots"]),
         (["box-7x11x5", "--robots", "0"], ["robots", "0", "1"]),
-        (["box-7x11x5", "--robots", "-3"], ["robots"]),
         (["box-7x11x5", "--robots", "5000"], ["robots", "5000", "1000"]),
         (["box-7x11x5", "--robots", "900", "--json"], ["robots", "900", "at most"]),
         (["box-7x11x5", "--seed", "-1"], ["seed", "-1"]),
-        (["box-7x11x5", "--seed", "0.5"], ["--seed", "0.5"]),
         (["box-7x11x5", "--channel.burst", "-1"], ["burst", "-1"]),
-        (["box-7x11x5", "--channel.i-min-bits", "nan"], ["i_min_bits", "nan"]),
-        (["box-7x11x5", "--channel.loss-probability", "1.5"], ["loss_probability", "1.5"]),
-        (["box-7x11x5", "--robot.motion", "crawl"], ["motion", "crawl", "planar"]),
-        (["box-7x11x5", "--robot.reach-m", "0"], ["reach_m", "0"]),
-        (["box-7x11x5", "--sensor.max-range-m", "-1"], ["max_range_m", "-1"]),
         (["box-7x11x5", "--sensor.field-of-view-rad", "9", "1"], ["field_of_view_rad", "9"]),
-        (["box-7x11x5", "--ending.sigma-end", "inf"], ["sigma_end", "inf"]),
         (["box-7x11x5", "--voxel-size-m", "0.2"], ["voxel_size_m", "--world"]),
         (["box-7x11x5", "--world", "missing.bt"], ["world", "missing.bt", "exists"]),
         (["box-7x11x5", "--world", "missing.bt", "--voxel-size-m", "nan"], ["voxel_size_m", "nan"]),
@@ -191,10 +131,6 @@ def test_the_table_leaves_out_what_means_nothing(command):
 )
 def test_bad_input_is_one_line_and_code_2(words, said, command):
     check_refused(command(*words), said)
-
-
-def test_too_many_robots_are_one_line_also_under_a_progress_bar(command):
-    check_refused(command("box-7x11x5", "--robots", "900"), ["robots", "900"])
 
 
 # --- as a process
@@ -224,12 +160,6 @@ def test_as_a_process_it_prints_the_same_object(figures):
     assert without_clock(json.loads(out)) == without_clock(figures("--seed", "1"))
 
 
-def test_bad_input_ends_a_process_with_code_2():
-    with process("box-7x11x5", "--robots", "none") as started:
-        out, err = started.communicate(timeout=300)
-    check_refused(Ran(started.returncode, out, err), ["--robots"])
-
-
 ENDLESS = ("--ending.sigma-end", "0.0002", "--ending.time-limit-s", "inf")
 
 
@@ -256,18 +186,3 @@ def test_an_interrupted_process_writes_what_was_done_and_ends_with_130(tmp_path)
     results = load_record(tmp_path / "mission.npz").results
     assert results["time_s"][-1] == figures["t_mission_s"] and len(results["poses"]) == len(results["time_s"])
     assert (results["joint_precision"] > 0.0).all() and figures["ended_by"] == []
-
-
-def test_the_mission_s_end_is_said_by_its_name():
-    assert {end.name for end in MissionEnd} == {
-        "RUNNING",
-        "MAPPED",
-        "TIME_UP",
-        "CYCLES_UP",
-        "SEEN",
-        "STOPPED",
-        "EXHAUSTED",
-    }
-    env = EntropyExploreEnv(with_settings(scripted(BOX), {"max_cycles": 3}))
-    run_mission(env, make_strategy("random"), 0)
-    assert mission_figures(env.missions, 0)["end_reason"] == "CYCLES_UP"

@@ -63,21 +63,6 @@ def test_the_same_seed_gives_the_same_mission(kind, period_s):
     assert states[0] == states[2] != states[1]
 
 
-def test_strategies_start_from_the_same_poses_whatever_they_draw():
-    starts = []
-    for name in ("random", "gradient"):
-        env = EntropyExploreEnv(scripted(BOX), time_limit_s=5.0)
-        poses: list[list[float]] = []
-        run_mission(
-            env,
-            make_strategy(name),
-            8,
-            lambda env, poses=poses: poses.append(env.view("robot_1").pose.tolist()),
-        )
-        starts.append(poses)
-    assert starts[0][0] == starts[1][0] and starts[0][-1] != starts[1][-1]
-
-
 def test_scripted_scenarios_step_from_decision_to_decision_and_observe_nothing():
     changed = scripted(BOX)
     assert changed.decision_period_s is None

@@ -13,7 +13,7 @@ from baselines.experiments.trials import Trial
 from baselines.papers import bhattacharya
 from baselines.papers.bhattacharya import EXPERIMENT, sweep
 from baselines.papers.bhattacharya.measured import split
-from baselines.papers.bhattacharya.run import packed, start_cells, unpacked
+from baselines.papers.bhattacharya.run import start_cells
 from baselines.papers.bhattacharya.simulation.belief import GridBelief, Readings, Scanner
 from baselines.papers.bhattacharya.simulation.team import Rules, Simulation
 from baselines.papers.bhattacharya.sweep import FLOORS
@@ -106,16 +106,6 @@ def test_robots_step_to_free_neighbours_and_explore_all_that_can_be_reached():
             assert not believed[~occupied].any() and believed.any()
 
 
-def test_one_robot_needs_no_messages():
-    occupied = plan(4)
-    start = start_cells(occupied, "corner", 1, 0)
-    tallies = [
-        Simulation(occupied, start, Rules(range_cells=5.0, perfect=perfect)).run(300)
-        for perfect in (True, False)
-    ]
-    assert tallies[0].places == tallies[1].places
-
-
 def test_a_phase_reaches_everybody_once_whatever_is_repeated():
     """Without loss all beliefs hold all readings but those that still wait."""
     occupied = plan(5)
@@ -168,9 +158,3 @@ def test_the_command_writes_its_page_and_goes_on_where_it_was(tmp_path, monkeypa
     assert ran.claims["scipy"]["ours"] > 0.0 and "split-band" in ran.claims
     (measured,) = [row.record for row in ran.rows if row.cell == "measured"]
     assert set(measured["splits"]) == {"band", "patch"}
-
-
-def test_maps_of_a_record_come_back():
-    maps = {"cells_0": np.arange(6, dtype=np.int8).reshape(2, 3), "iteration_0": np.array(7)}
-    found = unpacked(packed(maps))
-    assert set(found) == set(maps) and all((found[name] == maps[name]).all() for name in maps)

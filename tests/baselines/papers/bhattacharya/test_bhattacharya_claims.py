@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from baselines.experiments.statistics import Interval
 from baselines.papers.bhattacharya.claims import (
     all_claims,
     channel_claims,
     channel_table,
     first_floor,
-    flying_table,
-    interval,
 )
 from baselines.papers.bhattacharya.sweep import (
     CHANNELS,
@@ -22,7 +19,6 @@ from baselines.papers.bhattacharya.sweep import (
     channel_id,
     coverage_id,
     exploration_id,
-    flying_id,
     mission_cells,
 )
 
@@ -104,11 +100,6 @@ def test_variants_are_compared_plan_by_plan(records):
     assert not any(name.id == "variant-phases-wide" for name in claims)  # not run there
 
 
-def test_one_run_has_no_interval():
-    assert interval(Interval(3.0, 3.0, 3.0), 1) == (3.0, None, None)
-    assert interval(Interval(3.0, 2.0, 4.0), 2) == (3.0, 2.0, 4.0)
-
-
 def test_variants_are_pictured_on_the_largest_plan_in_which_they_were_run(records):
     assert [first_floor(records, name) for name in ("paper", "nearest-length")] == ["wide", "narrow"]
     small = {name: r for name, r in records.items() if "-small-" in name}
@@ -138,9 +129,3 @@ def test_channels_are_compared_seed_by_seed():
     assert claim(claims, "time-phases-all-once-0").ours == 2.0
     assert claim(claims, "utility-phases-all-once-0").ours == 0.5  # who gained nothing counts 0
     assert "| utility-64 | 250 | 125 | 1.000 | 2.000 |" in channel_table(missions)
-
-
-def test_flying_teams_stand_by_world():
-    missions = {flying_id("cave", "voronoi"): [mission(200.0), mission(600.0, finished=False)]}
-    assert flying_table({}) == "None were run."
-    assert "| cave | voronoi | 400 | 50.0 |" in flying_table(missions)

@@ -84,13 +84,6 @@ def test_own_betas_are_judged_by_other_missions():
     assert not any(claims[f"plans-no-single-{end}"].holds for end in ("t95_s", "t99_s", "t_none_s"))
 
 
-def test_single_robots_have_nobody_to_wait_for():
-    alone = {name: found for name, found in synthetic(as_claimed).items() if "/n1/" in name}
-    claims = all_claims(alone)
-    assert claims and not any("-async-" in claim.id for claim in claims)
-    assert [claim.paper for claim in claims if claim.id.endswith("team-1")] == [0.93]
-
-
 def test_claims_do_not_hold_where_all_are_alike():
     claims = all_claims(synthetic(lambda world, team, method: 1.0))
     alike = [claim for claim in claims if claim.id.endswith("-points")]

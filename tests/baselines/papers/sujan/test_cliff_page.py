@@ -8,10 +8,9 @@ import pytest
 from baselines.experiments.trials import CellTrial
 from baselines.papers.sujan import cliff, cliff_figures, cliff_mission
 from baselines.papers.sujan.cliff import EXPERIMENT, all_claims
-from baselines.papers.sujan.cliff_figures import edge_of_world, samples
+from baselines.papers.sujan.cliff_figures import samples
 from baselines.papers.sujan.cliff_mission import (
     LOOKS,
-    METHODS,
     STEPS,
     cell_id,
     looks_of,
@@ -20,15 +19,6 @@ from baselines.papers.sujan.cliff_mission import (
 )
 from entropy_explore_env.belief.elevation import completed
 from tests.baselines.papers.pages import cells_of, run_paper
-
-
-def test_the_cells_are_the_five_methods_from_one_place():
-    cells = cells_of(EXPERIMENT, 30)
-    assert [cells[cell_id(method)].strategy for method in (1, 2, 3, 4, 5)] == list(METHODS.values())
-    for cell in cells.values():
-        assert (cell.seeds, cell.scenario.ending.max_cycles) == (30, LOOKS + STEPS)
-        (start,) = cell.surroundings.settings()["every_reset"]["starts"]  # type: ignore[union-attr]
-        assert start == [2.0625, 6.0625, 4.0625, 0.0, 0.0]
 
 
 def test_a_mission_records_its_columns_scan_by_scan(monkeypatch):
@@ -77,13 +67,6 @@ def test_claims_by_hand():
     assert claims["edge"].ours == 2
 
 
-def test_a_mission_that_ends_early_stays_where_it_ended():
-    early = record_of(3)
-    early["columns"] = early["columns"][:8]
-    records = {cell_id(1): [early]}
-    assert new_columns(records, 1)[0, [3, 4, STEPS]].tolist() == [9, 9, 9]
-
-
 def test_both_samples_of_fig_7_are_completed():
     """Waves come back nearly; a step goes on as it was at the border of what is known, and falls off."""
     waves, step = samples()
@@ -94,12 +77,6 @@ def test_both_samples_of_fig_7_are_completed():
     assert (np.diff(filled, axis=0) <= 1e-3).all() and 0.0 <= filled.min() and filled.max() <= 1.0
     first_unknown = int(step.known[0].sum())
     assert filled[5, first_unknown] > 0.95 and filled[-6, first_unknown] < 0.05
-
-
-def test_the_edge_of_a_world_is_a_polygon_of_few_corners():
-    heights, edge = edge_of_world(1)
-    assert 5 < len(edge.polygon) < 30 < len(edge.border)
-    assert (edge.plateau[heights == heights.max()]).all()
 
 
 def test_the_command_writes_its_page_and_goes_on_where_it_was(tmp_path, capsys, monkeypatch):
