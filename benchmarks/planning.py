@@ -9,17 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
 
-from baselines.papers.bhattacharya.measured import cost_graph
-from benchmarks.rows import Effort, Goal, Row, alone, compared, interleave, timed
-from entropy_explore_env.belief.paths.geodesic_cells import (
-    UNREACHED,
-    Tessellation,
-    new_tessellation,
-    tessellate,
-)
+from baselines.papers.bhattacharya.measured import beside_scipy
+from benchmarks.rows import Effort, Goal, Row, alone, compared, timed
 from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
 from entropy_explore_env.belief.paths.planning import search_paths
 from entropy_explore_env.belief.paths.search import new_search
@@ -122,38 +114,10 @@ def voronoi_row(name: str, costs: np.ndarray, effort: Effort) -> Row:
     """Return maps a second with the cells of SOURCES sources; SciPy gives the costs, and no cells."""
     free, shape = np.flatnonzero(np.isfinite(costs)), costs.shape
     sources = np.random.default_rng(1).choice(free, SOURCES, replace=False).astype(np.int32)
-    graph, ours = cost_graph(costs), new_tessellation((shape[0], shape[1], 1))
-    tessellate(ours, costs, sources)
-    check_tessellation(ours, graph, sources)
-    taken = interleave(
-        {
-            "ours": lambda _: timed(lambda: tessellate(ours, costs, sources)),
-            "scipy": lambda _: timed(lambda: dijkstra(graph, indices=sources, min_only=True)),
-        },
-        effort.long_rounds,
-    )
-    return compared(
-        f"geodesic Voronoi cells, {shape[0]} × {shape[1]}, {SOURCES} sources, {name}",
-        "SciPy dijkstra, min_only",
-        [1.0 / t.cpu_s for t in taken["ours"]],
-        [1.0 / t.cpu_s for t in taken["scipy"]],
-        "maps/s",
-        Goal("≥", 4.5),
-    )
-
-
-def check_tessellation(ours: Tessellation, graph: csr_matrix, sources: np.ndarray) -> None:
-    """Raise a RuntimeError unless costs and cells are those of a Dijkstra from each source by itself."""
-    each = dijkstra(graph, indices=sources)
-    costs, cells, least = ours.costs.ravel(), ours.cells.ravel(), each.min(axis=0)
-    if not np.allclose(costs, least, rtol=1e-6):
-        raise RuntimeError("our costs are not SciPy's")
-    reached = np.flatnonzero(np.isfinite(least))
-    if (cells[~np.isfinite(least)] != UNREACHED).any():
-        raise RuntimeError("a voxel that no source reaches has a cell")
-    first = (each[:, reached] <= least[reached] * (1.0 + 1e-9)).argmax(axis=0)
-    if not np.array_equal(cells[reached], first):
-        raise RuntimeError("our cells are not those of the first nearest source")
+    seconds = beside_scipy(costs, sources, effort.long_rounds)
+    job = f"geodesic Voronoi cells, {shape[0]} × {shape[1]}, {SOURCES} sources, {name}"
+    rates = ([1.0 / each_s for each_s in side] for side in seconds)
+    return compared(job, "SciPy dijkstra, min_only", *rates, "maps/s", Goal("≥", 4.5))
 
 
 def crossing_row(shape: tuple[int, int, int], effort: Effort) -> Row:

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scipy.sparse.csgraph import dijkstra
 
-from baselines.papers.bhattacharya.measured import cost_graph
+from baselines.papers.bhattacharya.measured import check_tessellation, cost_graph
 from benchmarks.planning import (
     Search,
-    check_tessellation,
     cluttered,
     crossing_row,
     maze,

@@ -20,7 +20,12 @@ from scipy.sparse.csgraph import dijkstra
 from baselines.experiments.rows import Record
 from baselines.papers.bhattacharya.run import Run, start_cells
 from entropy_explore_env.belief.entropy import LN2
-from entropy_explore_env.belief.paths.geodesic_cells import new_tessellation, tessellate
+from entropy_explore_env.belief.paths.geodesic_cells import (
+    UNREACHED,
+    Tessellation,
+    new_tessellation,
+    tessellate,
+)
 
 SHAPE = (200, 121, 1)
 ETAS = (1e-4, 1e-3, 1e-2, 3e-2, 1e-1, 1.0)
@@ -109,27 +114,40 @@ def cost_graph(costs_per_cell: np.ndarray, length_cost: float = 0.0, by_length: 
 
 
 class Seconds(NamedTuple):
-    """Seconds of processor time of a tessellation; SciPy's without the owners of cells."""
+    """Seconds of processor time of a tessellation in each round; SciPy's without the owners of cells."""
 
-    ours: float
-    scipy: float
+    ours: list[float]
+    scipy: list[float]
 
 
 def beside_scipy(costs_per_cell: np.ndarray, sources: np.ndarray, rounds: int = 5) -> Seconds:
-    """Seconds of processor time of a tessellation, ours and SciPy's (`min_only`, costs alone); medians.
+    """Time a tessellation, ours and SciPy's (`min_only`, costs alone), in turns.
 
     Raises:
-        RuntimeError: The costs differ.
+        RuntimeError: Costs or cells differ.
     """
     graph, space = cost_graph(costs_per_cell), new_tessellation(costs_per_cell.shape)
     tessellate(space, costs_per_cell, sources)
-    if not np.allclose(space.costs.ravel(), dijkstra(graph, indices=sources, min_only=True), rtol=1e-6):
-        raise RuntimeError("our costs are not SciPy's")
-    ours, theirs = [], []
+    check_tessellation(space, graph, sources)
+    seconds = Seconds([], [])
     for _ in range(rounds):
-        ours.append(_timed(lambda: tessellate(space, costs_per_cell, sources)))
-        theirs.append(_timed(lambda: dijkstra(graph, indices=sources, min_only=True)))
-    return Seconds(statistics.median(ours), statistics.median(theirs))
+        seconds.ours.append(_timed(lambda: tessellate(space, costs_per_cell, sources)))
+        seconds.scipy.append(_timed(lambda: dijkstra(graph, indices=sources, min_only=True)))
+    return seconds
+
+
+def check_tessellation(ours: Tessellation, graph: csr_matrix, sources: np.ndarray) -> None:
+    """Raise a RuntimeError unless costs and cells are those of a Dijkstra from each source by itself."""
+    each = dijkstra(graph, indices=sources)
+    costs, cells, least = ours.costs.ravel(), ours.cells.ravel(), each.min(axis=0)
+    if not np.allclose(costs, least, rtol=1e-6):
+        raise RuntimeError("our costs are not SciPy's")
+    reached = np.flatnonzero(np.isfinite(least))
+    if (cells[~np.isfinite(least)] != UNREACHED).any():
+        raise RuntimeError("a voxel that no source reaches has a cell")
+    first = (each[:, reached] <= least[reached] * (1.0 + 1e-9)).argmax(axis=0)
+    if not np.array_equal(cells[reached], first):
+        raise RuntimeError("our cells are not those of the first nearest source")
 
 
 def _timed(work: Callable[[], object]) -> float:
@@ -165,4 +183,5 @@ class Measured:
         plan = self.largest.plan()
         costs = np.where(plan, np.inf, 1.0).astype(np.float32)
         seconds = beside_scipy(costs, np.array(start_cells(plan, "random", 4, 0)))
-        return {"splits": ratios(), "ours_s": seconds.ours, "scipy_s": seconds.scipy}
+        ours_s, scipy_s = map(statistics.median, seconds)
+        return {"splits": ratios(), "ours_s": ours_s, "scipy_s": scipy_s}
