@@ -59,15 +59,7 @@ def turns(steps: int, missions: int, seed: int) -> np.ndarray:
 
 
 def check_bursts(robots: np.ndarray, burst: int) -> None:
-    """Make sure that the robots did the work that is timed.
-
-    Args:
-        robots: ROBOT, any shape.
-        burst: Measurements of a whole one.
-
-    Raises:
-        RuntimeError: They did not scan, or sent less than they should.
-    """
+    """Raise a RuntimeError unless the robots (ROBOT, any shape) scanned, and sent whole bursts."""
     scans, sent = int(robots["scans"].sum()), int(robots["measurements_sent"].sum())
     if scans == 0 or sent < _FULL_SHARE * burst * scans:
         raise RuntimeError(f"{sent} measurements sent in {scans} scans: the bursts of {burst} are not full")

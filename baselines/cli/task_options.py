@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Protocol, TypeVar
 
 from baselines.cli.arguments import given_values, overlaid
 from baselines.cli.options import Mark
-from baselines.cli.world_options import Reading, world_settings
+from baselines.cli.world_options import Reading
 from baselines.experiments.mission import Surroundings
 from entropy_explore_env.command import allow_read_memory
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -187,15 +187,7 @@ def parsed_for(task: BaseTask, args: Arguments, words: Sequence[str], **more: ob
 
 
 def options_for(task: BaseTask, given: Mapping[str, Any]) -> TaskOptions:
-    """Return a task's own options, changed where a command line says so.
-
-    Args:
-        task: The task.
-        given: What the command line gives of TaskOptions, as `given_values` has it.
-
-    Raises:
-        SettingError: An option is not allowed in this task.
-    """
+    """Return a task's own options, changed by what `given_values` found of TaskOptions."""
     return overlaid(task.defaults(), given)
 
 
@@ -250,6 +242,9 @@ def limit_s(options: TaskOptions) -> float:
 def worlds_of(options: TaskOptions, files: Sequence[str] | None = None) -> dict[str, Any]:
     """Return settings of an environment in the world files of a task; limit the memory that reading takes.
 
+    A single file of which nothing is asked stays a setting of the scenario, which a mission record refers to;
+    else the record holds the world.
+
     Args:
         options: Of the command.
         files: In place of the options' own.
@@ -258,11 +253,19 @@ def worlds_of(options: TaskOptions, files: Sequence[str] | None = None) -> dict[
         SettingError: An option of world files is given without a file.
     """
     reading = options.world_file
-    worlds = options.world if files is None else files
-    if worlds and reading.read_memory_mib is not None:
+    worlds: Sequence[str] = options.world if files is None else files
+    size = {} if options.voxel_size_m is None else {"voxel_size_m": options.voxel_size_m}
+    if not worlds:
+        for name, value in (size | reading.asked()).items():
+            raise SettingError(name, value, "--world beside it")
+        return {}
+    if reading.read_memory_mib is not None:
         allow_read_memory(reading.read_memory_mib)  # of this process: no setting of a mission
         reading = dataclasses.replace(reading, read_memory_mib=None)
-    return world_settings(worlds, options.voxel_size_m, reading)
+    if len(worlds) > 1 or reading.asked():
+        path = worlds[0] if len(worlds) == 1 else list(worlds)
+        return {"world": {"path": path, **size, **reading.options()}}
+    return {"world": worlds[0], **({"grid": size} if size else {})}
 
 
 def reset_options(starts: str | None, world_number: int | None, scenario: Scenario) -> dict[str, Any]:

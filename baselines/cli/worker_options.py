@@ -57,13 +57,7 @@ class TrialOptions(WorkerOptions):
     """Run missions again that are older than this git commit."""
 
     def how(self, title: str, quiet: bool, limit_s: float = math.inf, **more: bool | float) -> How:
-        """Return how trials are run.
-
-        Args:
-            title: Of the progress bar.
-            quiet: Show no bar.
-            limit_s: Of every trial.
-            **more: Other fields of `How`.
+        """Return how trials are run; further words are other fields of `How`.
 
         Raises:
             SettingError: An option is not allowed, or contradicts another one.

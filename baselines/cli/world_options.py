@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
-
-from entropy_explore_env.errors import SettingError
 
 
 @dataclass
@@ -56,26 +53,3 @@ class Reading:
         if options.pop("hollow", False):
             options["fill"] = False
         return options
-
-
-def world_settings(worlds: Sequence[str], voxel_size_m: float | None, reading: Reading) -> dict[str, Any]:
-    """Return settings of an environment in world files; what JSON holds.
-
-    Args:
-        worlds: The files; none = the scenario's own world.
-        voxel_size_m: Edge of the voxels wanted; None = the scenario's.
-        reading: How they are read. A single file of which nothing is asked stays a setting of the scenario,
-            which a mission record refers to; else the record holds the world.
-
-    Raises:
-        SettingError: Something is asked for and there is no file.
-    """
-    size = {} if voxel_size_m is None else {"voxel_size_m": voxel_size_m}
-    if not worlds:
-        for name, value in (size | reading.asked()).items():
-            raise SettingError(name, value, "--world beside it")
-        return {}
-    if len(worlds) > 1 or reading.asked():
-        path = worlds[0] if len(worlds) == 1 else list(worlds)
-        return {"world": {"path": path, **size, **reading.options()}}
-    return {"world": worlds[0], **({"grid": size} if size else {})}

@@ -196,14 +196,7 @@ Later = Callable[[Suite, Records], tuple[Task, ...]]
 
 
 def task_in(name: str, scenario: Scenario, missions: int, **settings: Any) -> Task:  # noqa: ANN401 - settings
-    """Return a task in one scenario, in worlds of the test split.
-
-    Args:
-        name: Name of the task.
-        scenario: Whose worlds are drawn.
-        missions: Their number.
-        **settings: Further settings of the scenario.
-    """
+    """Return a task of some missions in one scenario, in worlds of the test split, with further settings."""
     tested = with_settings(scenario, {"split": "test", "track_truth": True, **settings})
     return Task(name, (Place(name, tested, missions),))
 
