@@ -68,7 +68,7 @@ class Args(TrialOptions):
 
     usual: ClassVar = (
         *("suite", "scenarios", "world", "strategies", "robots", "seeds", "quick", "settings"),
-        *("time_limit_s", "wall_limit_s", "stop_after_s", "jobs", "out", "tables", "json"),
+        *("wall_limit_s", "jobs", "out", "tables", "json"),
         *("entry", "author", "check", "cite"),
     )
 

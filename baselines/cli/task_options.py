@@ -253,7 +253,7 @@ def worlds_of(options: TaskOptions, files: Sequence[str] | None = None) -> dict[
         SettingError: An option of world files is given without a file.
     """
     reading = options.world_file
-    worlds: Sequence[str] = options.world if files is None else files
+    worlds = list(options.world if files is None else files)
     size = {} if options.voxel_size_m is None else {"voxel_size_m": options.voxel_size_m}
     if not worlds:
         for name, value in (size | reading.asked()).items():
@@ -263,7 +263,7 @@ def worlds_of(options: TaskOptions, files: Sequence[str] | None = None) -> dict[
         allow_read_memory(reading.read_memory_mib)  # of this process: no setting of a mission
         reading = dataclasses.replace(reading, read_memory_mib=None)
     if len(worlds) > 1 or reading.asked():
-        path = worlds[0] if len(worlds) == 1 else list(worlds)
+        path = worlds[0] if len(worlds) == 1 else worlds
         return {"world": {"path": path, **size, **reading.options()}}
     return {"world": worlds[0], **({"grid": size} if size else {})}
 
