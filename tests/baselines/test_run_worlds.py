@@ -120,7 +120,7 @@ def test_the_table_says_whose_robots_explore_a_loaded_world(floor, command):
         ("room", ("--robot.max-speed-m-s", "0.5"), "those of room, changed", "the whole world"),
         ("room", ("--sensor.max-range-m", "2.5"), "those of room, changed", "2.5 m"),
     ):
-        lines = command(scenario, *words, *more).out.splitlines()
+        lines = [f"{line} " for line in command(scenario, *words, *more).out.splitlines()]
         assert any("sensor's range" in line and f" {range_said} " in line for line in lines)
         assert any("robots and sensor" in line and f" {said} " in line for line in lines)
         assert any(" 60 × 50 voxels of 0.1 m " in line for line in lines)
