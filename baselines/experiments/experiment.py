@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -114,19 +113,10 @@ class Experiment:
         return Amount(quick, chosen, worlds)
 
 
-@dataclass(frozen=True)
-class Reproduced:
-    """What came of an experiment: its page, its claims, and the seconds on the clock that it took."""
-
-    page: Path
-    claims: list[Claim]
-    wall_s: float
-
-
 def reproduce(
     experiment: Experiment, amount: Amount, table: Path, how: How, out: Path, command: str
-) -> Reproduced:
-    """Run what is missing of an experiment, judge it and write its page.
+) -> list[Claim]:
+    """Run what is missing of an experiment, judge it and write its page; return its claims.
 
     Args:
         experiment: What.
@@ -136,7 +126,6 @@ def reproduce(
         out: Folder of the page; in a folder beside it lie its figures and `claims.csv`.
         command: What makes the same page again.
     """
-    started = time.perf_counter()
     rows = [row for row in run_trials(experiment.trials(amount), table, how) if row is not None]
     records = by_cell(rows)
     claims = told(experiment.claims(records), experiment.groups)
@@ -145,22 +134,15 @@ def reproduce(
         {name: partial(draw, records) for name, draw in experiment.figures.items()},
         {name: partial(make, records) for name, make in experiment.tables.items()},
         {name: make(records) for name, make in experiment.values.items()},
-        page_texts(experiment, claims, origins_line(rows), command, amount),
+        {
+            "claims": groups_table(claims, experiment.groups).strip(),
+            "held": f"{sum(claim.holds for claim in claims)} of {len(claims)} hold",
+            "rows": origins_line(rows),
+            "command": command,
+            "seeds": amount.seeds,
+            "quick": amount.quick,
+        },
     )
-    path = page.write(out, experiment.name)
+    page.write(out, experiment.name)
     write_atomically(out / experiment.name / "claims.csv", claims_csv(claims))
-    return Reproduced(path, claims, round(time.perf_counter() - started, 1))
-
-
-def page_texts(
-    experiment: Experiment, claims: Sequence[Claim], rows: str, command: str, amount: Amount
-) -> dict[str, Any]:
-    """Return what a template may use by name."""
-    return {
-        "claims": groups_table(claims, experiment.groups).strip(),
-        "held": f"{sum(claim.holds for claim in claims)} of {len(claims)} hold",
-        "rows": rows,
-        "command": command,
-        "seeds": amount.seeds,
-        "quick": amount.quick,
-    }
+    return claims

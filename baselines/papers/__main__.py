@@ -7,6 +7,7 @@ Their rows are kept in --runs, a table an experiment: what was stopped goes on w
 from __future__ import annotations
 
 import importlib
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,19 +66,17 @@ def main(words: Sequence[str]) -> int:
 
     options = [word for word in words if word != args.paper]
     command = told_command(f"python -m baselines.papers {args.paper}", options, _NOT_TOLD)
-    done = {}
+    failed, found = False, {}
     for experiment, amount in zip(experiments, amounts, strict=True):
-        table = args.runs / f"{experiment.name}.jsonl"
-        done[experiment.name] = reproduce(experiment, amount, table, how, args.out, command)
+        table, started = args.runs / f"{experiment.name}.jsonl", time.perf_counter()
+        claims = reproduce(experiment, amount, table, how, args.out, command)
+        wall_s = round(time.perf_counter() - started, 1)
+        found[experiment.name] = {"claims": [claim.row() for claim in claims], "wall_s": wall_s}
+        failed = failed or not all(claim.holds for claim in claims)
         if not args.json:
-            print(f"{experiment.title}\n{terminal_claims(done[experiment.name].claims)}\n")
+            print(f"{experiment.title}\n{terminal_claims(claims)}\n")
     if args.json:
-        found = {
-            name: {"claims": [claim.row() for claim in each.claims], "wall_s": each.wall_s}
-            for name, each in done.items()
-        }
         print_json({"paper": args.paper, "experiments": found})
-    failed = [claim for each in done.values() for claim in each.claims if not claim.holds]
     return 1 if args.strict and failed else 0
 
 

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from baselines.experiments.experiment import Amount
-from baselines.experiments.rows import Record
 from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.papers.rochami.mission import Run
 from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig
 from entropy_explore_env.settings.changes import with_settings
-from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import LAB, ROOM
 
 TEAMS = tuple(range(2, 11))
@@ -64,19 +61,15 @@ class Change:
     starts: int = 1000
 
 
-def _changed(**robot: Any) -> dict[str, Any]:  # noqa: ANN401
-    return {"robot": robot}
-
-
 CHANGES: dict[str, Change] = {
     "bodies": Change(
         "bodies off: no robot is in the way",
-        _changed(body_radius_m=0.0),
+        {"robot": {"body_radius_m": 0.0}},
         {"teammates_block": False},
     ),
     "bodies-no-overlap": Change(
         "bodies off, and λ = 1",
-        _changed(body_radius_m=0.0),
+        {"robot": {"body_radius_m": 0.0}},
         {"teammates_block": False, "overlap": False, "interference": 1.0},
     ),
     "overlap": Change("λ = 1: overlap does not count", {}, {"overlap": False}, both=False),
@@ -102,9 +95,9 @@ CHANGES: dict[str, Change] = {
         starts=10,
     ),
     "starts": Change("all start within 1.5 m of each other", {"start_radius_m": 1.5}, {}),
-    "reach": Change("candidates at most 1 m away", _changed(reach_m=1.0), {}),
+    "reach": Change("candidates at most 1 m away", {"robot": {"reach_m": 1.0}}, {}),
     "end": Change("the mission ends at σ = 0.1 instead of 0.2", {"ending": {"sigma_end": 0.1}}, {}),
-    "wait-15": Change("blocked robots wait 15 s instead of 5 s", _changed(blocked_wait_s=15.0), {}),
+    "wait-15": Change("blocked robots wait 15 s instead of 5 s", {"robot": {"blocked_wait_s": 15.0}}, {}),
 }
 
 
@@ -139,7 +132,7 @@ def experiment(amount: Amount) -> list[CellTrial]:
     cells = [
         _cell(cell_id(1, "random"), {"robots": 1}, "random", starts),
         _cell(cell_id(1, "coordinated"), {"robots": 1}, "coordinated", starts),
-        _cell("n1-random-1m", _merged({"robots": 1}, _changed(reach_m=1.0)), "random", starts),
+        _cell("n1-random-1m", {"robots": 1, "robot": {"reach_m": 1.0}}, "random", starts),
     ]
     for robots in teams:
         for blocked in BLOCKED:
@@ -148,7 +141,7 @@ def experiment(amount: Amount) -> list[CellTrial]:
                 covered = robots in COVERED and blocked == "wait" and method != "random"
                 name = cell_id(robots, method, blocked)
                 cells.append(_cell(name, settings, method, starts, covered=covered))
-        short = _merged({"robots": robots}, _changed(reach_m=1.0))
+        short = {"robots": robots, "robot": {"reach_m": 1.0}}
         cells.append(_cell(f"n{robots}-random-1m", short, "random", starts))
     for kappa in QUICK_KAPPAS if quick else KAPPAS[1:]:
         cells.append(_cell(kappa_id(kappa), {"robots": 2}, "coordinated", starts, {"distance_cost": kappa}))
@@ -156,7 +149,7 @@ def experiment(amount: Amount) -> list[CellTrial]:
         for robots in FEW:
             for method in METHODS[:2] if CHANGES[name].both else METHODS[:1]:
                 change = CHANGES[name]
-                settings = _merged({"robots": robots}, change.settings)
+                settings = {"robots": robots, **change.settings}
                 cell, few = change_id(name, robots, method), min(starts, change.starts)
                 cells.append(_cell(cell, settings, method, few, change.coordination))
     return trials_of(cells + _sharing_cells(starts, quick))
@@ -170,29 +163,14 @@ def _cell(
     coordination_settings: dict[str, Any] | None = None,
     covered: bool = False,
 ) -> Cell:
+    scenario = with_settings(with_settings(LAB, _BASE), settings)
+    if method != "coordinated":
+        scenario = with_settings(scenario, {"channel": {"announcements": False}})
     if method == "random":
-        return Cell(name, _lab(_merged(settings, {"channel": {"announcements": False}})), "random", starts)
-    coordinated = method == "coordinated"
-    if not coordinated:
-        settings = _merged(settings, {"channel": {"announcements": False}})
-    run: Callable[..., Record] = Run(
-        MutualInformationConfig(**{"coordinated": coordinated, **(coordination_settings or {})}), covered
-    )
-    strategy = "mutual-information" if coordinated else "ground-gradient"
-    return Cell(name, _lab(settings), strategy, starts, run)
-
-
-def _lab(settings: dict[str, Any]) -> Scenario:
-    return with_settings(LAB, _merged(_BASE, settings))
-
-
-def _merged(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
-    """Return settings with others over them, part by part."""
-    merged = dict(one)
-    for name, value in other.items():
-        both = isinstance(value, dict) and isinstance(merged.get(name), dict)
-        merged[name] = {**merged[name], **value} if both else value
-    return merged
+        return Cell(name, scenario, "random", starts)
+    own = {"coordinated": method == "coordinated", **(coordination_settings or {})}
+    strategy = "mutual-information" if method == "coordinated" else "ground-gradient"
+    return Cell(name, scenario, strategy, starts, Run(MutualInformationConfig(**own), covered))
 
 
 def _sharing_cells(starts: int, quick: bool) -> list[Cell]:
