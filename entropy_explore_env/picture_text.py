@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import unicodedata
 from functools import lru_cache
 
 from PIL import ImageFont
-
-_FAR_M = 10_000.0
-"""Coordinates beyond this, such as those of UTM, are written from a round number."""
 
 
 @lru_cache(maxsize=16)
@@ -46,12 +42,3 @@ def shortened(text: str, width: float, size: int) -> str:
     while kept and text_width(kept + "…", size) > width:
         kept = kept[:-1]
     return kept.rstrip() + "…"
-
-
-def base_m(low_m: float) -> float:
-    """Return what coordinates are written from: 0, or a round number if they are as large as those of UTM.
-
-    Args:
-        low_m: The least of them, metres.
-    """
-    return math.floor(low_m / 1000.0) * 1000.0 if abs(low_m) > _FAR_M else 0.0
