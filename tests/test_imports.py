@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import ast
-import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -19,26 +17,6 @@ TRUTH = ("Missions", "World", "load_octomap", "load_world", "save_world")
 HEAVY = (*PACKAGES[1:], "tests", "torch", "matplotlib", "stable_baselines3", "ray")
 """What importing the library never loads, nor what only some need."""
 FOR_SOME = ("pygame", "av", "rerun", "octomap", "docstring_parser", "rich", "tensorboard", "pandas")
-WRONG_IMPORTS = {
-    f"{LIBRARY}.belief.raycast": (f"{LIBRARY}.belief.map_update", f"{LIBRARY}.robots.motion"),
-    f"{LIBRARY}.belief.paths.lattice": (f"{LIBRARY}.belief.paths.planning",),
-    f"{LIBRARY}.robots.channel": (f"{LIBRARY}.robots.motion", "pettingzoo"),
-    f"{LIBRARY}.missions.rules": (f"{LIBRARY}.missions.tick", "torch"),
-    f"{LIBRARY}.reports.colours": (f"{LIBRARY}.envs.infos", "stable_baselines3"),
-    f"{LIBRARY}.settings.scenario": (f"{LIBRARY}.settings.scenarios", "tests.reference"),
-    f"{LIBRARY}.worlds.recipes.plan": (f"{LIBRARY}.worlds.load", f"{LIBRARY}.worlds.recipes.cave"),
-    f"{LIBRARY}.worlds.recipes.cave": (f"{LIBRARY}.worlds.recipes.office",),
-    f"{LIBRARY}.worlds.files.voxels": (f"{LIBRARY}.worlds.files.worker", f"{LIBRARY}.worlds.world"),
-    f"{LIBRARY}.worlds.files.images": (f"{LIBRARY}.writing", f"{LIBRARY}.worlds.files.process"),
-    f"{LIBRARY}.envs.infos": (LIBRARY, f"{LIBRARY}.envs.robot_vec_env", "baselines.run"),
-    "baselines.strategies.rules.gradient": (
-        f"{LIBRARY}.missions.simulation",
-        "baselines.papers.rocha04.sweep",
-    ),
-    "baselines.papers.rocha04.sweep": ("baselines.papers.rochami.sweep", "training.policy"),
-    "training.policy": (f"{LIBRARY}.worlds.load", f"{LIBRARY}.robots.channel", "benchmarks.speed"),
-}
-"""Importer → what it may not import."""
 
 
 def check_contracts(folder: Path) -> subprocess.CompletedProcess[str]:
@@ -58,35 +36,6 @@ def test_the_contracts_are_kept():
     done = check_contracts(ROOT)
     assert done.returncode == 0, done.stdout[done.stdout.find("Contracts:") :] + done.stderr
     assert " 0 broken." in done.stdout
-
-
-@pytest.fixture(scope="module")
-def complaints(tmp_path_factory) -> list[str]:
-    """What the contracts say of a copy of the checkout with all wrong imports in it."""
-    copy = tmp_path_factory.mktemp("checkout")
-    shutil.copy(ROOT / "pyproject.toml", copy)
-    for package in PACKAGES:
-        shutil.copytree(ROOT / package, copy / package, ignore=shutil.ignore_patterns("__pycache__", "*.nb?"))
-    for importer, targets in WRONG_IMPORTS.items():
-        with copy.joinpath(*importer.split(".")).with_suffix(".py").open("a") as file:
-            file.writelines(f"def _():\n    import {target}\n" for target in targets)
-    (copy / LIBRARY / "belief" / "placeless.py").write_text("")
-    done = check_contracts(copy)
-    assert done.returncode == 1, done.stderr
-    broken = done.stdout.split("Broken contracts")[1]
-    return re.findall(r"^ *- +([\w.]+(?: -> [\w.]+)?)", broken, flags=re.MULTILINE)
-
-
-@pytest.mark.parametrize(
-    "wrong", [f"{importer} -> {target}" for importer, targets in WRONG_IMPORTS.items() for target in targets]
-)
-def test_a_wrong_import_breaks_a_contract(complaints, wrong):
-    wrong = wrong.replace("tests.reference", "tests")  # of what is not a package of ours, the first name
-    assert wrong in complaints
-
-
-def test_a_file_without_a_place_breaks_a_contract(complaints):
-    assert f"{LIBRARY}.belief.placeless" in complaints
 
 
 def test_a_folder_of_the_library_has_an_init_of_one_sentence():

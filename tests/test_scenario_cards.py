@@ -28,8 +28,7 @@ from entropy_explore_env.settings import scenarios
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import SCENARIOS
-from entropy_explore_env.version import VERSION
-from tests.code_blocks import DOCS, FENCED
+from tests.code_blocks import FENCED
 
 ALL_PARTS = {
     "observation": {"drive": True, "patch": True, "overview": True, "action_mask": True},
@@ -130,26 +129,6 @@ def test_a_card_shows_what_fails_and_whose_map_counts_then(tmp_path):
     assert "the entropy of any robot's map falls to H_th" in card(scenarios.ROOM, tmp_path)
 
 
-def test_numbers_of_actions_that_robots_ignore_are_named():
-    """The cliff's rover pans and tilts in its plane; of the mixed team only some fly."""
-    for name, ignored in (("cliff", [2]), ("office-mixed", [2, 4]), ("room", []), ("office", [])):
-        told = action_numbers(SCENARIOS[name])
-        assert [n.first for n in told if "means nothing" in n.meaning] == ignored
-
-
-def test_a_card_says_what_a_second_costs(tmp_path):
-    text = card(SCENARIOS["room"], tmp_path)
-    assert "- 0.00606 × seconds.\nA mission of 33 s returns about 0.8, one twice as long 0.6. With" in text
-    assert "a second costs 0.00247: there a mission of 81 s returns about 0.8." in text
-    assert "With `robots=1`" not in card(SCENARIOS["cliff"], tmp_path)
-
-
-def test_a_card_says_which_version_of_the_id_is_of_which_release(tmp_path):
-    text = card(SCENARIOS["room-furnished"], tmp_path)
-    assert f"| `entropy_explore_env/RoomFurnished-v1` | {'.'.join(VERSION.split('.')[:2])}" in text
-    assert "| `entropy_explore_env/RoomFurnished-v0` | 0.1.0" in text
-
-
 def test_times_come_from_the_suites_of_the_scoreboard(tmp_path):
     """Of missions by hand: three of one cell finish, and one of them has no time to 99 %."""
     for suite, strategy, seconds in (
@@ -175,16 +154,3 @@ def test_times_come_from_the_suites_of_the_scoreboard(tmp_path):
     assert "4 robots" not in text and "`random`" not in text
     bare = with_settings(SCENARIOS["office"], {"name": "mine"})
     assert scenario_times.times_table(bare, tmp_path) == ""
-
-
-def test_the_reference_lists_all_parts_of_a_scenario():
-    page = (DOCS / "api" / "settings.md").read_text(encoding="utf-8")
-    waiting, named = [SCENARIOS["office-mixed"]], set()
-    while waiting:
-        part = waiting.pop()
-        named.add(type(part).__name__)
-        waiting += [v for v in vars(part).values() if dataclasses.is_dataclass(v)]
-    assert "Scenario" in named and "Robot" in named
-    assert [
-        name for name in sorted(named) if not re.search(rf"autoclass:: .*\b{name}$", page, re.MULTILINE)
-    ] == []

@@ -11,7 +11,6 @@ from urllib.parse import unquote, urlsplit
 
 import pytest
 
-from docs.extensions.literal_blocks import mark_literal
 from docs.extensions.repository_links import to_repository
 from tests.code_blocks import DOCS, ROOT, Block, blocks, shown_files
 
@@ -95,40 +94,3 @@ def test_links_out_of_docs_lead_to_the_repository():
         "[`e`](https://h/r/blob/main/README.md#f) [g](../api.md)"
     )
     assert to_repository("[a](../x/y.py)", "page.md", "https://h/r") == "[a](https://h/r/blob/main/x/y.py)"
-
-
-def test_indented_blocks_of_docstrings_are_literal():
-    lines = [
-        "Text",
-        "of two lines:",
-        "",
-        "    a = b*",
-        "",
-        "    c",
-        "",
-        ":param x: y",
-        "",
-        "   z",
-        "",
-        "- item",
-        "",
-        "  w",
-    ]
-    marked = mark_literal(lines)
-    assert marked == [*lines[:3], "::", "", *lines[3:]]
-
-
-@pytest.mark.parametrize("width_px", [360, 390, 430])
-def test_the_first_title_fits_beside_the_buttons_of_a_phone(width_px):
-    style = (DOCS / "static" / "site.css").read_text(encoding="utf-8")
-    (title,) = re.findall("^# (.+)$", (DOCS / "index.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
-    (share,) = re.findall(
-        r"@media \(max-width: 36em\) {\s+h1 {\s+font-size: clamp\([^,]+, ([\d.]+)vw,", style
-    )
-    margins, buttons, letter = (
-        32,
-        73,
-        0.52,
-    )  # as measured; a letter's mean width as a share of the font's size
-    assert len(title) * letter * float(share) / 100 * width_px <= width_px - margins - buttons
-    assert "td:has(img) ~ td code.literal .pre" in style.partition("@media")[2]  # ids in the gallery

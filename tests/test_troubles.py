@@ -6,7 +6,6 @@ later comes to the same bytes. A full disk is a limit on the size of files here:
 
 from __future__ import annotations
 
-import itertools
 import os
 import shutil
 import time
@@ -124,13 +123,6 @@ def test_kernels_work_without_a_home_and_without_a_cache_that_can_be_written(ker
     number = {"HOME": 3, "XDG_CACHE_HOME": 4 + 0j}[variable]  # types that nothing was compiled for
     assert doubled(number) == 2 * number
     assert len(kernels[1]) == 1
-
-
-def test_a_sweep_does_not_mind_a_clock_that_jumps(undisturbed, tmp_path, monkeypatch):
-    sound, jumps = time.time, itertools.cycle((0.0, -400 * DAY_S, 5e8, -3600.0, 1e-3))
-    monkeypatch.setattr(time, "time", lambda: sound() + next(jumps))
-    assert run_command(benchmark.main, [*SWEEP, str(tmp_path)]) == 0
-    assert contents(tmp_path) == undisturbed
 
 
 def test_a_clock_that_jumps_removes_only_kernels_that_look_old(tmp_path):

@@ -20,7 +20,6 @@ import pytest
 import torch
 from gymnasium import spaces
 
-from baselines.cli.interruption import Interruption
 from baselines.experiments.mission import Surroundings
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
@@ -28,7 +27,7 @@ from entropy_explore_env.settings.scenarios import SCENARIOS
 from tests.systems import needs_posix
 from training import ppo
 from training.advantages import DecisionBuffer
-from training.checkpoints import NotFiniteError, checkpoint_name, latest_checkpoint, load_checkpoint
+from training.checkpoints import checkpoint_name, latest_checkpoint, load_checkpoint
 from training.validation import Validator
 
 ROOT = Path(__file__).parents[2]
@@ -193,18 +192,6 @@ def test_ctrl_c_writes_a_checkpoint_and_says_how_to_go_on(
         assert [row["steps"] for row in csv.DictReader(file)] == ["192", "384"]
 
 
-def test_a_second_ctrl_c_ends_at_once(capsys):
-    before = signal.getsignal(signal.SIGINT)
-    with Interruption("the end is written") as interruption:
-        assert not interruption.asked
-        signal.raise_signal(signal.SIGINT)
-        assert interruption.asked
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-    assert capsys.readouterr().err.count("\n") == 1
-    assert signal.getsignal(signal.SIGINT) is before
-
-
 def test_a_run_without_a_checkpoint_begins_again_and_says_so(tmp_path, capsys):
     """The folder alone names it; there is a checkpoint after the first update already."""
     out, loud = tmp_path / "run", [word for word in TINY if word != "--json"]
@@ -220,22 +207,6 @@ def test_a_run_without_a_checkpoint_begins_again_and_says_so(tmp_path, capsys):
     assert [path.name for path in out.glob("step-*")] == [checkpoint_name("step", n) for n in (96, 384)]
     assert resume(out, "--total-steps", "400") == 0
     assert f"{out} goes on after 384 steps; total_steps was 96" in capsys.readouterr().err
-
-
-def test_that_a_run_begins_again_is_said_at_once(uninterrupted, tmp_path, monkeypatch, capsys):
-    out = tmp_path / "run"
-    out.mkdir()
-    shutil.copy(uninterrupted[0] / "run.json", out)
-
-    def refuse(*_: object) -> None:
-        raise NotFiniteError("set-up", float("nan"), 0)
-
-    monkeypatch.setattr(ppo, "set_up", refuse)
-    command = json.loads((out / "run.json").read_text())
-    command["args"]["json"] = False
-    (out / "run.json").write_text(json.dumps(command))
-    assert resume(out) == BAD_INPUT
-    assert capsys.readouterr().err.startswith(f"no checkpoint in {out}: from the beginning\n")
 
 
 @pytest.mark.parametrize(
@@ -366,12 +337,6 @@ def test_a_best_policy_without_a_checkpoint_counts_as_a_run_and_a_resumed_run_re
     assert not later.is_dir() and len(list(out.glob("best-*"))) >= 1
 
 
-FEW = (
-    "--missions 2 --rollout-steps 4 --batch 8 --epochs 1 --validation-missions 1 --time-limit-s 3 "
-    "--no-video --json"
-).split()
-
-
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_the_defaults_make_a_policy_for_every_named_scenario(name):
     args = ppo.parsed(["--scenario", name, "--missions", "1"])
@@ -383,16 +348,3 @@ def test_the_defaults_make_a_policy_for_every_named_scenario(name):
     actions = state.envs.action_space
     assert isinstance(actions, spaces.Discrete) and actions.n == moves * gazes
     assert state.model.policy.observation_space == state.envs.observation_space
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name == "office" else pytest.mark.long) for name in SCENARIOS]
-)
-def test_training_begins_in_every_named_scenario(name, tmp_path, capsys):
-    """Three rollouts and updates, a validation and a checkpoint."""
-    robots = ppo.training_task(ppo.parsed(["--scenario", name])).scenario.robots
-    steps = 3 * 4 * 2 * robots
-    words = [*FEW, "--scenario", name, "--total-steps", str(steps), "--out", str(tmp_path / "run")]
-    assert ppo.run_command(ppo.main, words) == 0
-    assert json.loads(capsys.readouterr().out)["steps"] == steps
-    assert list((tmp_path / "run").glob("step-*"))

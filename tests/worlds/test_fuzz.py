@@ -12,7 +12,7 @@ from benchmarks.proofs.files import read_worlds
 from benchmarks.proofs.hostile_worlds import MUTATORS, drawn_octree, mutant
 from benchmarks.proofs.world_samples import samples
 from entropy_explore_env.errors import WorldError
-from entropy_explore_env.worlds.files.process import ReaderProcess, kept_reader
+from entropy_explore_env.worlds.files.process import kept_reader
 from entropy_explore_env.worlds.load import load_world
 
 FEW, MANY = 40, 500
@@ -50,11 +50,6 @@ def mutants(loader: str, count: int, seed: int) -> list:
     return [mutant(sources, number, np.random.default_rng([seed, number])) for number in range(count)]
 
 
-def test_mutants_are_the_same_for_the_same_seed():
-    first, again, other = (mutants("image", 40, seed) for seed in (1, 1, 2))
-    assert first == again != other
-
-
 def test_every_mutator_changes_something():
     for loader in ("map_server", "height npz", "height png", "glb", "octomap"):
         named = {name for name, _ in mutants(loader, 120, 0)}
@@ -77,13 +72,3 @@ def test_drawn_octrees_are_read_and_refused(folder):
     assert loaded > 20
     assert causes["a whole OctoMap tree of at most 16 levels below its root"] > 2
     assert causes["an OctoMap tree of as many nodes as its head says"] > 5
-
-
-def test_a_reader_that_is_given_goes_on_after_the_files(folder):
-    reader = ReaderProcess()
-    for part in ("first", "second"):
-        (folder / part).mkdir()
-        read_worlds("image", folder / part, 5, 7, reader)
-        running = reader._process
-        assert running is not None and running.poll() is None
-    reader.close()

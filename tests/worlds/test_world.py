@@ -204,13 +204,6 @@ def test_between_ground_and_ceiling():
     assert layout.visible_voxels == (~world.occupied).sum() + skin
 
 
-@pytest.mark.parametrize("ceiling", [np.full((7, 11), 3), np.full((7, 5), 3, np.int32), np.zeros((7, 11))])
-def test_ceilings_that_are_none_are_refused(ceiling):
-    with pytest.raises(WorldError) as raised:
-        World(Grid(SIZE, 0.5), np.zeros(SIZE, bool), "bad", ceiling=ceiling)
-    assert raised.value.field == "World.ceiling"
-
-
 def test_robots_that_look_level_see_what_their_field_of_view_can_hold():
     """Sensor at 1.25 m, the middle of layer 2; rays up to 26.565°: tan = ½."""
     world = world_of(np.zeros(SIZE, bool))
@@ -236,27 +229,6 @@ def test_robots_that_look_level_see_what_their_field_of_view_can_hold():
     seen = world.layout(flatter).visible
     assert (seen <= expected).all() and seen[:, :, 2].all()
     assert seen[:, 0, 1].all() and not seen[:, :, 0].any()
-
-
-def test_layouts_of_other_bodies_are_other_layouts():
-    world = world_of(divided_room())
-    small, large = (world.layout(free_box(grid=world.grid, robot={"body_radius_m": r})) for r in (0.1, 0.3))
-    assert len(large.starts) < len(small.starts)
-
-
-@pytest.mark.parametrize(
-    "occupied",
-    [np.zeros((7, 11, 4), bool), np.zeros(SIZE, np.int8), np.ones(SIZE, bool), np.zeros(385, bool)],
-)
-def test_worlds_that_are_none_are_refused(occupied):
-    with pytest.raises(WorldError, match=r"World\.occupied = .*: expected") as raised:
-        World(Grid(SIZE, 0.5), occupied, "bad")
-    assert raised.value.field == "World.occupied"
-
-
-def test_the_truth_cannot_be_written():
-    with pytest.raises(ValueError, match="read-only"):
-        world_of(np.zeros(SIZE, bool)).occupied[0, 0, 0] = True
 
 
 def test_a_world_keeps_a_copy_unless_nobody_can_write_through_what_it_is_given():

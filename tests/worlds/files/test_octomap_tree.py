@@ -11,14 +11,12 @@ import pytest
 from benchmarks.proofs.world_samples import octomap_bytes
 from entropy_explore_env.command import READ_MEMORY_VARIABLE, allow_read_memory
 from entropy_explore_env.errors import SettingError, WorldError
-from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.settings.scenarios import BOX
-from entropy_explore_env.worlds.files import octomap_tree, process
+from entropy_explore_env.worlds.files import octomap_tree
 from entropy_explore_env.worlds.files.process import kept_reader
 from entropy_explore_env.worlds.files.resampling import resampled
 from entropy_explore_env.worlds.files.voxels import Voxels
-from entropy_explore_env.worlds.load import load_octomap, load_world, make_world, with_world
-from tests.reference.scenes import free_box, wander
+from entropy_explore_env.worlds.load import load_octomap, load_world
+from tests.reference.scenes import free_box
 from tests.worlds.trees import building, write_tree
 
 octomap = pytest.importorskip("octomap", reason="octomap-python is not installed")
@@ -75,16 +73,6 @@ def test_resampled_voxels_are_free_if_half_is_free_and_less_than_a_quarter_solid
         block = fine[tuple(slice(i * parts, (i + 1) * parts) for i in voxel)]
         free = (block == FREE).mean() >= 0.5 and (block == SOLID).mean() < 0.25
         assert world.occupied[voxel] == (not free), voxel
-
-
-@pytest.mark.parametrize("edge_m", [0.05, 0.08, 0.1, 0.15, 0.3])
-def test_a_wall_one_voxel_thick_stays_a_wall_in_voxels_four_times_as_large(tmp_path, edge_m):
-    labels = np.full((16, 12, 8), FREE)
-    labels[6] = SOLID
-    world = load_octomap(write(tmp_path / "wall.bt", labels, edge_m, np.zeros(3, int)), 4 * edge_m)
-    assert world.grid.shape == (4, 3, 2)
-    assert world.occupied[1].all()
-    assert not world.occupied[[0, 2, 3]].any()
 
 
 @pytest.mark.parametrize("share", [0.5, 0.7, 1.5, 2.0, 2.9, 4.0, 11.3])
@@ -157,21 +145,6 @@ def test_what_takes_too_much_memory_says_which_option_allows_more(tmp_path, monk
             allow_read_memory(wrong)
 
 
-BROKEN = {
-    "empty": b"",
-    "noise": np.random.default_rng(0).bytes(4096),
-    "text": b"# Octomap OcTree binary file\n",
-    "no data": b"# Octomap OcTree binary file\nid OcTree\nsize 9\nres 0.1\ndata\n",
-    "noise after the header": b"# Octomap OcTree binary file\nid OcTree\nsize 900\nres 0.1\ndata\n"
-    + np.random.default_rng(1).bytes(900),
-    "another tree": b"# Octomap OcTree binary file\nid ColorOcTree\nsize 1\nres 0.1\ndata\n\x00\x00",
-    "a tree of colours": b"# Octomap OcTree file\nid ColorOcTree\nsize 1\nres 0.1\ndata\n" + bytes(8),
-    "no resolution": b"# Octomap OcTree binary file\nid OcTree\nsize 1\nres 0\ndata\n\x01\x00",
-    "resolution below 0": b"# Octomap OcTree binary file\nid OcTree\nsize 1\nres -1\ndata\n\x01\x00",
-    "resolution nan": b"# Octomap OcTree binary file\nid OcTree\nsize 1\nres nan\ndata\n\x01\x00",
-}
-
-
 def refused(path, voxel_size_m=None):
     """The one line that a file is refused with."""
     with pytest.raises(WorldError) as raised:
@@ -182,13 +155,6 @@ def refused(path, voxel_size_m=None):
     assert "\n" not in str(error)
     assert str(error) == f"{error.field} = {error.value!r}: expected {error.allowed}"
     return error
-
-
-@pytest.mark.parametrize("kind", BROKEN)
-def test_broken_files_are_refused(tmp_path, kind):
-    path = tmp_path / "broken.bt"
-    path.write_bytes(BROKEN[kind])
-    assert refused(path).value == str(path)
 
 
 def full_tree(masks, size=None, res=b"0.1"):
@@ -271,24 +237,9 @@ def test_trees_of_other_kinds_have_the_same_occupancy(tmp_path, suffix, change):
     np.testing.assert_array_equal(first.unknown, other.unknown)
 
 
-@pytest.mark.parametrize("missing", [1, 2, 3, 40, 300])
-def test_truncated_files_are_refused(tmp_path, missing):
-    labels = np.random.default_rng(0).choice([FREE, SOLID], (8, 8, 8))
-    path = write(tmp_path / "room.bt", labels, low=np.zeros(3, int))
-    whole = path.read_bytes()
-    path.write_bytes(whole[:-missing])
-    assert refused(path).value == str(path)
-
-
 def test_missing_files_and_folders_are_refused(tmp_path):
     assert refused(tmp_path / "nowhere.bt").allowed == "a file that exists"
     assert refused(tmp_path).allowed == "a file that exists"
-
-
-def test_files_too_large_are_refused_unread(tmp_path, monkeypatch):
-    path = write(tmp_path / "room.bt", some_labels())
-    monkeypatch.setattr(process, "MAX_FILE_BYTES", 100)
-    assert "MiB" in refused(path).allowed
 
 
 def test_a_file_whose_box_is_absurdly_large_is_refused(tmp_path):
@@ -311,25 +262,6 @@ def test_a_map_without_free_space_is_refused(tmp_path):
     path = write(tmp_path / "solid.bt", np.full(SHAPE, SOLID))
     assert "free space" in refused(path).allowed
     assert "free space" in refused(path, 0.3).allowed
-
-
-@pytest.mark.parametrize("size", [0.0, -1.0, math.nan, math.inf])
-def test_a_voxel_size_that_is_none_is_refused(tmp_path, size):
-    with pytest.raises(SettingError, match=r"voxel_size_m = .*: expected a number > 0"):
-        load_octomap(tmp_path / "nowhere.bt", size)
-
-
-def test_a_mission_in_a_world_from_a_file(tmp_path):
-    labels = some_labels()
-    path = write(tmp_path / "room.bt", labels)
-    scenario = with_world(free_box(world=str(path), grid=BOX.grid, robots=2, robot={"reach_m": 2.0}))
-    assert scenario.grid.voxel_size_m == 0.5  # the scenario's, not the file's
-    assert scenario.grid.origin_m == pytest.approx(tuple(LOW * EDGE_M))
-    missions = Missions(scenario)
-    missions.reset(0, 1)
-    wander(missions, 10, 0)
-    assert missions.worlds[0] is make_world(scenario, np.random.default_rng(0))  # read once
-    assert (missions.state.robots["scans"] > 0).all()
 
 
 @pytest.mark.skipif(not CORRIDOR.exists(), reason=f"{CORRIDOR} is not here: it is no part of the project")

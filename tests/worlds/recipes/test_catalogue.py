@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -170,14 +168,3 @@ def test_voxels_in_which_rooms_and_ways_get_lost_are_refused_by_name(name):
         with pytest.raises(WorldError) as raised:
             RECIPES[name](Grid((60, 50, 1), edge_m), draws)
         assert (raised.value.field, raised.value.value) == ("Grid.voxel_size_m", edge_m)
-
-
-@pytest.mark.parametrize("name", NATURAL)
-def test_a_default_world_is_made_in_a_fifth_of_a_second_and_the_largest_in_one(name):
-    recipe, grid = RECIPES[NATURAL[name].world], NATURAL[name].grid
-    times = []
-    for seed in range(3):
-        begun = time.thread_time()
-        recipe(grid, np.random.default_rng(seed))
-        times.append(time.thread_time() - begun)
-    assert min(times) < (1.0 if name == "bhattacharya-cluttered" else 0.2), times
