@@ -98,13 +98,12 @@ class Allocator:
 
     def _best_listed(self, robot: int, targets: Sequence[np.ndarray]) -> Choice | None:
         """Return the best of a robot's candidates; None where it reaches none that shows anything."""
-        slots, voxels = self._candidates.listed()
+        voxels = self._candidates.listed()
         edges = self._lengths_from(robot)[voxels]
-        near = np.isfinite(edges)
-        slots, voxels, edges = slots[near], voxels[near], edges[near]
-        if len(slots) == 0:
+        voxels, edges = voxels[np.isfinite(edges)], edges[np.isfinite(edges)]
+        if len(voxels) == 0:
             return None
-        places, takes = self._centres(voxels), np.zeros(len(slots))
+        places, takes = self._centres(voxels), np.zeros(len(voxels))
         for target in targets:
             takes += taken(places, target[:3], self._candidates.reach)
         seconds = seconds_of(self._view.scenario, robot, edges)
@@ -113,7 +112,7 @@ class Allocator:
             options = seen * self._candidates.point, seconds[which], edges[which], takes[which]
             return np.where(seen > 0.0, self._value(*options), -np.inf)
 
-        value = self._candidates.worths(slots, voxels, worth)
+        value = self._candidates.worths(voxels, worth)
         best = int(np.argmax(value))
         if value[best] == -math.inf:
             return None

@@ -64,7 +64,7 @@ class FrontierConfig:
 
 
 class FrontierMap(ABC):
-    """Candidates of one robot's belief, each in a slot, and V(height factor) of each in points.
+    """Candidates of one robot's belief, and V(height factor) of each in points.
 
     Counts are reused as upper bounds: while the map grows, no more unexplored points can be seen from a place
     than before. Near voxels that turn free, or are unexplored again, the bounds are forgotten.
@@ -83,7 +83,7 @@ class FrontierMap(ABC):
     _costs: np.ndarray
     """(V,) float32 traversal costs."""
     _voxels: np.ndarray
-    """(S,) int32, the voxel of the candidate in each slot; NONE = there is none."""
+    """(S,) int32, the candidates; NONE = a place of the array holds none."""
     _marks: np.ndarray
     """(V,) uint8, EXCLUDED where a scan was taken."""
     _rays: np.ndarray
@@ -108,10 +108,8 @@ class FrontierMap(ABC):
     def _start(self, points: int) -> None:
         """Prepare counts of points, once states, blocks, costs and candidates are there."""
         self._counter = new_counter(points, self._size)
-        self._bounds = np.full(len(self._voxels), np.inf)
-        """(S,) float64, upper bounds of the candidates' V·(height factor); inf = unknown."""
-        self._bounded = self._voxels.copy()
-        """(S,) int32, the candidates of which these are the bounds."""
+        self._bounds = np.full(len(self._costs), np.inf)
+        """(V,) float64, upper bounds of V·(height factor) in voxels; inf = unknown."""
         self.body_reach = self._blocks.reach
 
     @property
@@ -128,11 +126,11 @@ class FrontierMap(ABC):
         if sigma != self._sigma:
             self._states.sums[:], self._sigma = 0, sigma
         self.changed = int(self._read(view.mean.reshape(-1), view.precision.reshape(-1), levels))
-        self._forget_bounds()
         opened = self._states.opened[: self._states.opened_count[0]]
         self._states.opened_count[0] = 0
         if len(opened):
-            forget_in_range(self._size, opened, self._voxels, self._sight, self._bounds)
+            counted = np.flatnonzero(np.isfinite(self._bounds)).astype(np.int32)
+            forget_in_range(self._size, opened, counted, self._sight, self._bounds)
 
     def _refresh(self, voxels: np.ndarray, radius: int) -> None:
         """Find the candidates anew within a radius of (K,) voxels."""
@@ -140,12 +138,6 @@ class FrontierMap(ABC):
         for voxel in voxels.tolist():
             mark_around(self._blocks, voxel // layers, radius)
         self._find_candidates()
-        self._forget_bounds()
-
-    def _forget_bounds(self) -> None:
-        """Forget the bounds of candidates that are others than before."""
-        moved = self._voxels != self._bounded
-        self._bounds[moved], self._bounded[moved] = math.inf, self._voxels[moved]
 
     @abstractmethod
     def _read(self, mean: np.ndarray, precision: np.ndarray, levels: tuple[np.float32, np.float32]) -> int:
@@ -179,9 +171,9 @@ class FrontierMap(ABC):
         """Return the share of all points that are mapped."""
         return float((self._blocks.state & UNMAPPED == 0).mean())
 
-    def count(self, slots: np.ndarray, voxels: np.ndarray) -> np.ndarray:
+    def count(self, voxels: np.ndarray) -> np.ndarray:
         """Return (K,) V·(height factor): points expected to be seen, weighted by promises."""
-        self._bounds[slots], weighed = self._counted(voxels)
+        self._bounds[voxels], weighed = self._counted(voxels)
         return weighed
 
     def _counted(self, voxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -194,37 +186,31 @@ class FrontierMap(ABC):
             self._count_from(voxels, seen, weighed)
         return seen, weighed
 
-    def worths(
-        self,
-        slots: np.ndarray,
-        voxels: np.ndarray,
-        worth: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    ) -> np.ndarray:
+    def worths(self, voxels: np.ndarray, worth: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
         """Return what candidates are worth, counting V only of those that can be worth most.
 
         Args:
-            slots: (K,) of the candidates.
-            voxels: (K,) int32, theirs.
+            voxels: (K,) int32, of the candidates.
             worth: (N,) V·(height factor) in points and (N,) indices of candidates → (N,) what these are
                 worth, never less for a greater V.
 
         Returns:
             (K,); -inf for candidates that cannot be worth most.
         """
-        bound = worth(np.minimum(self._bounds[slots], self._most), np.arange(len(slots)))
-        found = np.full(len(slots), -np.inf)
+        bound = worth(np.minimum(self._bounds[voxels], self._most), np.arange(len(voxels)))
+        found = np.full(len(voxels), -np.inf)
         order = np.argsort(-bound, kind="stable")
         for first in range(0, len(order), _BATCH):
             batch = order[first : first + _BATCH]
             if bound[batch[0]] < found.max():
                 break
-            found[batch] = worth(self.count(slots[batch], voxels[batch]), batch)
+            found[batch] = worth(self.count(voxels[batch]), batch)
         return found
 
-    def listed(self, all_of_them: bool = False) -> tuple[np.ndarray, np.ndarray]:
-        """Return (K,) slots and (K,) int32 voxels of candidates: all, or those that may see something."""
-        slots = np.flatnonzero((self._voxels != NONE) & (all_of_them | (self._bounds > 0.0)))
-        return slots, self._voxels[slots]
+    def listed(self, all_of_them: bool = False) -> np.ndarray:
+        """Return (K,) int32 voxels of candidates: all, or those that may see something."""
+        voxels = self._voxels[self._voxels != NONE]
+        return voxels if all_of_them else voxels[self._bounds[voxels] > 0.0]
 
     def promise(self, place: np.ndarray) -> None:
         """Note that a robot will scan at (3,), grid units: it promises to see the points visible there."""
@@ -235,8 +221,7 @@ class FrontierMap(ABC):
 
     def release(self) -> None:
         """Forget all promises."""
-        if self._counter.promises[0] > 0:
-            self._counter.promised[:] = self._counter.promises[:] = 0
+        self._counter.promised[:] = 0
 
     def exclude(self, voxel: int) -> None:
         """Note that a scan was taken in a voxel: it is no candidate any more."""

@@ -83,7 +83,6 @@ class TerrainFrontiers(FrontierMap):
         replace_unreached(self._blocks, costs)
         for block in np.flatnonzero(self._blocks.candidate != before):
             take_column(self._map, block)
-        self._forget_bounds()
 
     def _counted(self, voxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """See `FrontierMap`."""

@@ -28,7 +28,7 @@ from entropy_explore_env.belief.raycast import (
 )
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.frontiers.blocks import NONE, UNEXPLORED
+from entropy_explore_env.frontiers.blocks import UNEXPLORED
 from entropy_explore_env.settings.robot_kind import RobotKind
 
 _MOST_RAYS = 720
@@ -47,8 +47,6 @@ class VisibilityCounter(NamedTuple):
     """(N,) int32, number of the latest count that met a point."""
     promised: np.ndarray
     """(N,) uint8, number of robots that will see a point."""
-    promises: np.ndarray
-    """(1,) int64, how many points were promised since the latest release."""
     latest: np.ndarray
     """(1,) int64, number of the latest count."""
     crossing: Crossing
@@ -62,7 +60,6 @@ def new_counter(points: int, shape: tuple[int, int, int]) -> VisibilityCounter:
     return VisibilityCounter(
         np.zeros(points, np.int32),
         np.zeros(points, np.uint8),
-        np.zeros(1, np.int64),
         np.zeros(1, np.int64),
         crossing,
     )
@@ -84,7 +81,6 @@ def count_point(counter, point, marking):
     promises = np.int64(counter.promised[point])
     if marking:
         counter.promised[point] = min(promises + 1, 255)
-        counter.promises[0] += 1
     return _WEIGHTS[promises]
 
 
@@ -137,20 +133,18 @@ def count_from(counter, state, size, voxels, directions, reach, seen, weighed):
 
 @lean_kernel
 def forget_in_range(size, opened, voxels, sight, bounds):
-    """Set the (K,) bounds of (K,) int32 voxels in sight of (N,) int32 opened ones to inf; NONE = no voxel.
+    """Set the (V,) bounds of (K,) int32 voxels in sight of (N,) int32 opened ones to inf.
 
     `sight` is a radius in voxel edges, and the weight of distances along z, 0 or 1.
     """
     radius, upright = sight
-    for place in range(len(voxels)):
-        if voxels[place] == NONE or math.isinf(bounds[place]):
-            continue
-        at = grid_index(size, voxels[place])
+    for voxel in voxels:
+        at = grid_index(size, voxel)
         for other in opened:
             x, y, z = grid_index(size, other)
             dx, dy, dz = x - at[0], y - at[1], (z - at[2]) * upright
             if dx * dx + dy * dy + dz * dz <= radius * radius:
-                bounds[place] = math.inf
+                bounds[voxel] = math.inf
                 break
 
 

@@ -95,7 +95,6 @@ class VoxelFrontiers(FrontierMap):
     def replace_unreached(self, cost: np.ndarray) -> None:
         """See `FrontierMap`."""
         replace_unreached(self._blocks, cost)
-        self._forget_bounds()
 
     def gains(self, voxels: np.ndarray) -> np.ndarray:
         """Return (K,) how many unknown voxels the sensor would see, all around, from (K,) int32 voxels."""

@@ -20,6 +20,9 @@ from entropy_explore_env.settings.sensor import RangeSensor
 
 LEVELS = 20
 """Intervals of occupancy, and of stretched occupancy, whose histograms are taken."""
+_MIDDLES = (np.arange(LEVELS) + 0.5) / LEVELS
+UNCERTAINTY = -(_MIDDLES * np.log2(_MIDDLES) + (1.0 - _MIDDLES) * np.log2(1.0 - _MIDDLES))
+"""(LEVELS,) -(p log2 p + (1 - p) log2(1 - p)) in the middle of each interval of occupancy."""
 _TOLERANCE = 0.01
 """Of the occupancy of unknown cells, as neighbours say it."""
 _WHOLE_CELLS = 40_000
@@ -205,3 +208,24 @@ def voxels_in_view(sensor: RangeSensor, grid: Grid) -> float:
         return float(grid.voxels)
     inside = 0.5 * wide * reach**2 if grid.flat else wide * 2.0 * math.sin(0.5 * high) * reach**3 / 3.0
     return float(min(max(inside, 1.0), grid.voxels))
+
+
+def new_information(
+    shares: np.ndarray, most: float, weights: np.ndarray | None = UNCERTAINTY, linear: bool = False
+) -> float:
+    """Return NI in bits of the histograms of a view.
+
+        NI = Σ_known u(p_k)·(-q_k log2 q_k) + Σ_unknown u(p_k)·(-q_k log2 q_k)
+
+    with q_k = n_k/N. With u of `UNCERTAINTY` it is eq. 8; with u = 1 and stretched occupancies eq. 6, whose
+    second sum has lost its minus sign in print.
+
+    Args:
+        shares: (2, LEVELS) number of known and unknown voxels in each interval.
+        most: N, the largest number of voxels in view.
+        weights: (LEVELS,) u; None = 1.
+        linear: Whether q_k stands in place of -q_k log2 q_k: ours, to compare with.
+    """
+    q = np.minimum(shares / most, 1.0)
+    bits = q if linear else -q * np.log2(np.where(q > 0.0, q, 1.0))
+    return float((bits if weights is None else bits * weights).sum())

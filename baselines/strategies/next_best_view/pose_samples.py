@@ -1,4 +1,4 @@
-"""Poses that Sujan's rules choose among, and the known paths that lead there."""
+"""Poses that Sujan's rules choose among, the known paths that lead there, and terms of their ratings."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.frontiers.knowledge import centres_of, voxel_of
+from entropy_explore_env.frontiers.knowledge import belief_of, centres_of, voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
+from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.planner.stops import straightened
 from entropy_explore_env.robots.knowledge import RobotKnowledge
+from entropy_explore_env.viewpoints.expected_localization import Drive, Surveyor, growth_of_error
 
 _NARROWEST_RAD = 0.1
 """Narrower views count as this wide where a robot looks all around."""
@@ -60,3 +62,43 @@ def yaws_around(wide_rad: float) -> list[float]:
 def poses_in(view: RobotKnowledge, voxels: int | np.ndarray, gazes: np.ndarray) -> np.ndarray:
     """Return the poses (..., 5) in the middle of (...) voxels with (..., 2) yaws and pitches, map frame."""
     return np.concatenate([centres_of(view, voxels), gazes], axis=-1)
+
+
+def pose_distance(pose: np.ndarray, viewpoint: np.ndarray) -> float:
+    """Return D of eq. 22 with all α = 1, between poses (5,): x, y, z in metres, yaw and pitch in radians."""
+    apart = viewpoint - pose
+    apart[3] = (apart[3] + math.pi) % (2.0 * math.pi) - math.pi
+    return float(np.linalg.norm(apart))
+
+
+def localization_error(view: RobotKnowledge, paths: KnownPaths, pose: np.ndarray) -> float:
+    """Return LE of a drive on the known path to a pose (5,), in metres; 0 where its pose is exact.
+
+    LE is how much less well the robot will know its pose there (Sujan, eq. 23).
+    Points count as far away as the robot's latest scan measured on average, r̂.
+
+    Args:
+        view: Of the robot.
+        paths: Through its known free space; their latest search begins where it stands.
+        pose: Map frame.
+    """
+    if not isinstance(view, RobotView) or view.rules.localization is None:  # only missions have fiducials
+        return 0.0
+    grid, sensor, robot = view.scenario.grid, view.kind.sensor, view.kind.robot
+    x, y, z = grid.origin_m
+    scan_every_m = min(sensor.scan_every_m, robot.reach_m)
+    surveyor = Surveyor(
+        params=view.rules.localization[view.robot : view.robot + 1],
+        landmarks_m=view.fiducials_m,
+        mean=belief_of(view).mean,
+        size=grid.shape,
+        origin_m=(float(x), float(y), float(z)),
+        voxel_size_m=float(grid.voxel_size_m),
+        min_range_m=float(sensor.min_range_m),
+        scan_every_m=float(scan_every_m),
+        own=view.landmarks,
+        matrices=np.empty((2, 4, 4)),
+    )
+    since_m = view.since_scan_m if scan_every_m == sensor.scan_every_m else 0.0
+    drive = Drive(view.pose, path_points(view, paths, pose), pose, float(since_m))
+    return float(growth_of_error(view.covariance, surveyor, drive, view.depth_m, np.empty((4, 4))))

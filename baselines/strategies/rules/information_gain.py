@@ -34,16 +34,16 @@ class InformationGain(FrontierRule):
         """Return the voxel to go to; see `FrontierRule`."""
         horizon = self.horizon * scene.cells.reach
         scene.paths.extend(horizon)
-        slots, voxels = scene.cells.listed(all_of_them=True)
+        voxels = scene.cells.listed(all_of_them=True)
         lengths = scene.paths.lengths_to(voxels)
         near = lengths <= min(horizon, scene.paths.reach)
         if near.sum() <= 1:
             voxels, lengths = scene.paths.nearest_frontiers()
             return best_of(voxels, -lengths, scene.target)
-        slots, voxels, lengths = slots[near], voxels[near], lengths[near]
+        voxels, lengths = voxels[near], lengths[near]
         weight = self.weight * scene.cells.reach
 
         def worth(gains: np.ndarray, which: np.ndarray) -> np.ndarray:
             return np.asarray(weight * np.log1p(gains) - lengths[which])
 
-        return best_of(voxels, scene.cells.worths(slots, voxels, worth), scene.target)
+        return best_of(voxels, scene.cells.worths(voxels, worth), scene.target)

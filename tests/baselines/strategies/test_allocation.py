@@ -151,7 +151,7 @@ def check_against_reference(missions, known):
     strategy, places = chosen(missions, 1.0)
     views = [view_of(missions, 0, robot) for robot in range(3)]
     candidates = strategy.cells_of(0)
-    _, voxels = candidates.listed()
+    voxels = candidates.listed()
     state = np.where(known, 0, 3)
     directions, reach = candidates._rays, candidates.reach
     shape, edge = known.shape, missions.grid.voxel_size_m

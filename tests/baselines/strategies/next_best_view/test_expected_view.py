@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 
 from baselines.strategies.next_best_view import expected_view
 from baselines.strategies.next_best_view.expected_view import (
+    UNCERTAINTY,
     extrapolated,
     look,
+    new_information,
     new_view,
     occupancy_map,
     voxels_in_view,
 )
-from baselines.strategies.next_best_view.rating import UNCERTAINTY, new_information
 from entropy_explore_env.belief.elevation import completed
 from entropy_explore_env.belief.fields import Belief, occupancy_probability
 from entropy_explore_env.settings.changes import with_settings
@@ -143,3 +144,11 @@ def test_the_largest_view_is_a_sector_or_part_of_a_ball():
     assert voxels_in_view(sector, plan) == pytest.approx(0.25 * math.pi * 25.0)
     assert voxels_in_view(ball, volume) == pytest.approx(4.0 / 3.0 * math.pi * 125.0)
     assert voxels_in_view(ball, Grid((7, 11, 1), 0.5)) == 77
+
+
+def test_new_information_by_hand():
+    shares = np.zeros((2, 20))
+    shares[1, 9] = 8.0  # an eighth of the largest view, at p = 0.475: 3 bits of 1/8, almost wholly uncertain
+    assert new_information(shares, 64.0, None) == pytest.approx(3.0 / 8.0)
+    assert new_information(shares, 64.0) == pytest.approx(0.99820 * 3.0 / 8.0, rel=1e-4)
+    assert new_information(shares, 64.0, linear=True) == pytest.approx(0.99820 / 8.0, rel=1e-4)

@@ -27,7 +27,7 @@ def test_counting_only_gains_that_may_be_best_changes_no_choice(weight, horizon,
         picked = varied(InformationGain(), weight=weight, horizon=horizon).pick(scene)
         scene.paths.start(scene.here)
         scene.paths.extend(math.inf)
-        _, voxels = scene.cells.listed(all_of_them=True)
+        voxels = scene.cells.listed(all_of_them=True)
         lengths = scene.paths.lengths_to(voxels)
         near = lengths <= horizon * scene.cells.reach
         if near.sum() > 1:

@@ -14,7 +14,7 @@ from baselines.strategies.metrics import Coordinated, ExplorationConfig, Metric,
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.blocks import COVERED, NONE
+from entropy_explore_env.frontiers.blocks import COVERED
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig, FrontierMap
 from entropy_explore_env.frontiers.terrain_frontiers import TerrainFrontiers
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
@@ -63,9 +63,9 @@ def small_terrain(**settings):
     return with_settings(base, {**changes, **settings})
 
 
-def eagerly(self, slots, voxels, worth):
+def eagerly(self, voxels, worth):
     """`FrontierMap.worths` that counts V of each candidate."""
-    return worth(self.count(slots, voxels), np.arange(len(slots)))
+    return worth(self.count(voxels), np.arange(len(voxels)))
 
 
 class Noting(PerTimeVisibility):
@@ -115,9 +115,9 @@ def check_lazily_is_as_eagerly(monkeypatch, scenario, seed, **settings):
 def counting(count, counted):
     """`Candidates.count` that notes how many it counts."""
 
-    def noted(self, slots, voxels):
-        counted.append(len(slots))
-        return count(self, slots, voxels)
+    def noted(self, voxels):
+        counted.append(len(voxels))
+        return count(self, voxels)
 
     return noted
 
@@ -154,11 +154,9 @@ def test_bounds_stay_bounds_through_a_noisy_mission(monkeypatch, seed):
         update(self, view, sigma)
         opened.append(np.count_nonzero(before & COVERED > self._states.state & COVERED))
         levels.add(sigma)
-        slots = np.flatnonzero((self._voxels != NONE) & np.isfinite(self._bounds))
-        bounds = self._bounds[slots].copy()
-        kept = self._bounds.copy()
-        self.count(slots, self._voxels[slots])
-        assert (bounds >= self._bounds[slots]).all()
+        kept, voxels = self._bounds.copy(), self.listed(all_of_them=True)
+        self.count(voxels)
+        assert (kept >= self._bounds).all()
         self._bounds[:] = kept
 
     monkeypatch.setattr(VoxelFrontiers, "update", checked)
@@ -209,14 +207,14 @@ def test_where_a_robot_scanned_is_a_candidate_again_once_more_is_asked_for(scena
     view = view_of(env.missions, 0, 0)
     candidates.readmit()
     candidates.update(view, 0.5)
-    before = set(candidates.listed()[1].tolist())
+    before = set(candidates.listed().tolist())
     candidates.update(view, 1e-3)
-    voxels = candidates.listed()[1].tolist()
+    voxels = candidates.listed().tolist()
     assert voxels and set(voxels) - before
     candidates.exclude(voxels[0])
-    assert voxels[0] not in candidates.listed()[1]
+    assert voxels[0] not in candidates.listed()
     candidates.readmit()
-    assert voxels[0] in candidates.listed()[1]
+    assert voxels[0] in candidates.listed()
 
 
 def test_synchronous_robots_leave_together():
