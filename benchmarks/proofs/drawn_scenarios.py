@@ -125,7 +125,8 @@ def _kernels_of(scenario: Scenario) -> tuple[Any, ...]:
     faulty, channel = scenario.faults.happen, scenario.channel
     parts = [getattr(scenario.observation, name) for name in _PARTS]
     content = channel.content if not faulty else None
-    return (scenario.drifts, faulty, channel.reach == "distance", content, *parts)
+    by_need = scenario.backlog_scans > 0
+    return (scenario.drifts, faulty, channel.reach == "distance", content, by_need, *parts)
 
 
 def _value(rng: np.random.Generator, hint: Any, name: str, default: Any, scenario: Scenario) -> Any:  # noqa: ANN401

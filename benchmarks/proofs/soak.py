@@ -30,6 +30,7 @@ CHANNELS: tuple[dict[str, Any], ...] = (
     {},
     {"delay_s": 2.0},
     {"loss_probability": 0.5},
+    {"loss_probability": 0.5, "order": "need"},
     {"range_m": 3.0},
     {"phase_s": 10.0, "repeats": 2},
     {"burst": 0, "announcements": False},

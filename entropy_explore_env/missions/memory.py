@@ -28,6 +28,7 @@ _PARTS = (
     ("scans", "RangeSensor.angular_step_rad", ("scan_",)),
     ("delayed messages", "Channel.delay_s", ("in_flight",)),
     ("the broadcast in phases", "Channel.phase_s", ("phase",)),
+    ("scans to be sent by need", "RangeSensor.angular_step_rad", ("backlog",)),
     ("candidates", "Action.candidates", ("candidates", "experience")),
     (
         "what robots heard",

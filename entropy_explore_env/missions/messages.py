@@ -11,6 +11,7 @@ from entropy_explore_env.belief.map_update import fuse_scan
 from entropy_explore_env.belief.pooling import Cells, Pool, fuse_pooled_scan
 from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import ASSERTING, lean_kernel
+from entropy_explore_env.missions.backlog import TeamBacklog
 from entropy_explore_env.missions.faults import (
     TeamFaults,
     count_silenced,
@@ -39,7 +40,6 @@ from entropy_explore_env.missions.state import Beliefs
 from entropy_explore_env.robots.channel import (
     BITS_PER_ANNOUNCEMENT,
     BITS_PER_BATCH,
-    BITS_PER_MEASUREMENT,
     Air,
     Delivery,
     draw_delivery,
@@ -47,6 +47,7 @@ from entropy_explore_env.robots.channel import (
     path_loss_db,
 )
 from entropy_explore_env.robots.measured_rays import trace_measurement
+from entropy_explore_env.settings.channel import BITS_PER_MEASUREMENT, BITS_PER_RECEIPT
 
 _OUT_OF_RANGE, _LOST = Delivery.OUT_OF_RANGE.code, Delivery.LOST.code
 _ANNOUNCEMENT = np.int64(-1)
@@ -70,6 +71,8 @@ class Team(NamedTuple):
     """None = all robots know where they are."""
     summaries: TeamSummaries | None = None
     """None = robots send measurements, and no summaries."""
+    backlog: TeamBacklog | None = None
+    """None = robots send what is most useful of their latest scans."""
 
 
 class Tracer(NamedTuple):
@@ -154,6 +157,14 @@ def message_bits(localization, count):
     if count < 0:
         return BITS_PER_ANNOUNCEMENT
     return BITS_PER_BATCH + count * BITS_PER_MEASUREMENT + covariance_bits(localization)
+
+
+@lean_kernel
+def receipt_bits(team):
+    """Return what the receipts in a message cost, where robots send by need."""
+    if team.backlog is None:  # known while compiling: nothing of the rest is compiled
+        return 0
+    return (len(team.robots) - 1) * BITS_PER_RECEIPT
 
 
 @lean_kernel
@@ -324,7 +335,8 @@ def announce(team, clock, in_flight, index, recipients):
     robot, shared = team.robots[index], team.params[0]
     if len(team.robots) == 1 or not shared.announcements:
         return
-    time_s, bits = clock.time_s, message_bits(team.localization, _ANNOUNCEMENT)
+    time_s = clock.time_s
+    bits = message_bits(team.localization, _ANNOUNCEMENT) + receipt_bits(team)
     count_sent(robot, _ANNOUNCEMENT, bits)
     delay_s = shared.delay_s + draw_lateness(team.faults, index)
     reached = transmit(team, index, point(robot.origin), clock.time_s, recipients)

@@ -14,6 +14,7 @@ from entropy_explore_env.missions.localization import (
     note_scan_pose,
 )
 from entropy_explore_env.missions.messages import fuse_measurements, send_batch
+from entropy_explore_env.missions.need import share_by_need
 from entropy_explore_env.missions.own_maps import note_measured
 from entropy_explore_env.missions.phases import collect_batch
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
@@ -70,7 +71,7 @@ def scan_and_share(mission, sensor, index, work):
         note_idle(clock, team.robots, clock.explored_visible == known)
         note_seen(team.params, clock, team.robots)
     if len(team.robots) > 1 and params.burst > 0:
-        share(mission, scan, index, work.recipients)
+        share(mission, scan, sensor, index, work.recipients)
 
 
 @lean_kernel
@@ -87,10 +88,10 @@ def note_scan(robot, latest, scan, index):
 
 
 @lean_kernel
-def share(mission, scan, index, recipients):
+def share(mission, scan, sensor, index, recipients):
     """Select the most useful measurements of a robot's scan, and send them, now or in the next phase.
 
-    Where robots send summaries, send one if it is time.
+    Where robots send summaries, send one if it is time; where they send by need, what teammates lack.
     """
     team, params = mission.team, mission.team.params[index]
     robot = team.robots[index]
@@ -98,9 +99,11 @@ def share(mission, scan, index, recipients):
     clock, in_flight = mission.clock, mission.in_flight
     if share_summary(team.summaries, team, mission.maps, clock, in_flight, index, recipients):
         return
-    count = select_measurements(scan.utility, params.burst, robot.i_min_bits, scan.order)
     if params.i_min_fill > 0.0:
         robot.next_i_min_bits = steered_i_min(robot.i_min_bits, scan.utility, params.burst, params.i_min_fill)
+    if share_by_need(team.backlog, mission, scan, sensor, index, recipients):
+        return
+    count = select_measurements(scan.utility, params.burst, robot.i_min_bits, scan.order)
     if count > 0 and params.phase_s == 0.0:
         send_batch(team, mission.maps, clock, in_flight, scan, index, count, recipients)
     elif count > 0:

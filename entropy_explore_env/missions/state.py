@@ -21,9 +21,11 @@ from entropy_explore_env.robots.localization import COVARIANCE_NUMBERS, ESTIMATE
 from entropy_explore_env.robots.map_summary import PARCEL, SUMMARY, summary_bytes
 from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.robots.ranges import (
+    FAR_POSE,
     FLAG,
     LARGEST_PRECISION,
     MOST,
+    PAST,
     PLACE,
     SHARE,
     SIGNED,
@@ -115,6 +117,19 @@ class MissionState(NamedTuple):
     """(E, Q) PARCEL, of each delayed message."""
     in_flight_summaries: np.ndarray
     """(E, A·K, M) uint8, summaries under way: K places of a robot, as `robots.map_summary` writes them."""
+    backlog_poses: np.ndarray
+    """(E, A, S, 5) float64, where the robots took their latest S scans, as they believe; empty, like all that
+    follow, where they do not send by need. A robot's nth scan is kept in place n mod S."""
+    backlog_rays: np.ndarray
+    """(E, A, S, R, 5) float64, as in `in_flight_rays`."""
+    backlog_bits: np.ndarray
+    """(E, A, S, R) float64, utility of each ray; -1 where nothing was measured."""
+    backlog_sent_s: np.ndarray
+    """(E, A, S, R) float64, when each measurement was sent last; 0 = never."""
+    backlog_heard_s: np.ndarray
+    """(E, A, S, R, A) float64, when each robot heard each measurement first; 0 = never."""
+    backlog_covariances: np.ndarray
+    """(E, A, S, 10) float64, as in `in_flight_covariances`."""
 
 
 class Beliefs(NamedTuple):
@@ -201,6 +216,7 @@ def state_arrays(scenario: Scenario, missions: int, cells: int) -> dict[str, Sta
     proposed = a if scenario.action.kind == "candidates" else 0
     bodies, in_phases = collision_bodies(scenario), a if scenario.phase_batches else 0
     drifting, numbers = scenario.drifts, COVARIANCE_NUMBERS
+    needing, kept = a if scenario.backlog_scans else 0, scenario.backlog_scans
     sharing, places = a if scenario.shares_summaries else 0, a * scenario.summary_slots
     arrays: dict[str, tuple[Any, ...]] = {
         "truth": ((e, v), np.float32),
@@ -239,6 +255,12 @@ def state_arrays(scenario: Scenario, missions: int, cells: int) -> dict[str, Sta
         "summaries": ((e, sharing), SUMMARY),
         "in_flight_parcels": ((e, q if sharing else 0), PARCEL),
         "in_flight_summaries": ((e, places, summary_bytes(v) if places else 0), np.uint8),
+        "backlog_poses": ((e, needing, kept, 5), np.float64, FAR_POSE),
+        "backlog_rays": ((e, needing, kept, r, 5), np.float64),
+        "backlog_bits": ((e, needing, kept, r), np.float64, Values(-1.0, MOST)),
+        "backlog_sent_s": ((e, needing, kept, r), np.float64, PAST),
+        "backlog_heard_s": ((e, needing, kept, r, a), np.float64, PAST),
+        "backlog_covariances": ((e, needing, kept if drifting else 0, numbers), np.float64, SPREAD),
     }
     return {
         name: StateArray(shape, np.dtype(kind), *values) for name, (shape, kind, *values) in arrays.items()

@@ -154,6 +154,10 @@ def _in_common(
         "in_flight_rays": np.where(np.isfinite(messages["due_s"]), messages["count"], 0),
         "phase_rays": np.where(filled, batches["count"], 0),
     }
+    if arrays["backlog_poses"].size:
+        own = np.array([scenario.kind_of(robot).sensor.rays for robot in range(scenario.robots)])
+        taken = np.arange(scenario.backlog_scans) < robots["scans"][..., None]
+        counts["backlog_rays"] = np.where(taken, own[:, None], 0)
     for name, count in counts.items():
         yield from _rays(scenario, name, arrays[name], count)
     parcels = arrays["in_flight_parcels"]

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.compilation.kernels import ASSERTING, lean_kernel
+from entropy_explore_env.missions.backlog import backlog_of
 from entropy_explore_env.missions.driving import (
     continue_drive,
     halt,
@@ -80,6 +81,7 @@ def step_missions(rules, state, choices, work, continuous, discrete, first, last
                 air_of(work.air, state.truth[m]),
                 localization_of(rules.localization, state.estimates, state.fiducials, state.landmarks, m),
                 summaries_of(work.tree, state, m),
+                backlog_of(work.selection, state, m),
             ),
             Maps(Beliefs(state.mean[m], state.precision[m], state.pooled[m]), rules.cells),
             JointMap(state.joint_mean[m], state.joint_precision[m], state.visible[m], state.drivable[m]),

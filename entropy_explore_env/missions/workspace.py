@@ -10,6 +10,7 @@ import numpy as np
 
 from entropy_explore_env.belief.map_update import Scan
 from entropy_explore_env.belief.raycast import Crossing, longest_crossing
+from entropy_explore_env.missions.backlog import Selection, new_selection
 from entropy_explore_env.missions.records import WAYPOINTS
 from entropy_explore_env.robots.map_summary import new_summary_tree
 from entropy_explore_env.robots.map_tree import Tree
@@ -35,6 +36,8 @@ class Workspace(NamedTuple):
     """Voxels between two robots; None = the channel reaches by distance alone: nothing else is compiled."""
     tree: Tree | None
     """For summaries of maps; None = robots send none: nothing of that is compiled."""
+    selection: Selection | None
+    """For messages by need; None = robots send none: nothing of that is compiled."""
     footprints: np.ndarray
     """(K, B, 3) int64, offsets of the voxels that bodies of each kind of robot touch; B = 0 if none plans."""
     covariances: np.ndarray | None
@@ -55,6 +58,7 @@ def new_workspace(scenario: Scenario, navigators: Mapping[int, Navigator]) -> Wo
         recipients=np.zeros(scenario.robots, np.bool_),
         air=_new_air(scenario),
         tree=new_summary_tree(grid.voxels) if scenario.shares_summaries else None,
+        selection=new_selection(scenario),
         footprints=footprints(navigators, len(kinds))
         if navigators
         else np.zeros((len(kinds), 0, 3), np.int64),

@@ -10,6 +10,9 @@ import numpy as np
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import FROM_WORLD
 
+_LATER = "backlog_"
+"""Empty arrays of such names are left out, so that records from before them keep their digests."""
+
 
 def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
     """Return the values of a mission's state, but for what follows from its world, by array and field.
@@ -23,7 +26,7 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
     """
     values: dict[str, np.ndarray] = {}
     for name, array in missions.state._asdict().items():
-        if name in FROM_WORLD:
+        if name in FROM_WORLD or (name.startswith(_LATER) and array.size == 0):
             continue
         if array.dtype.names is None:
             values[name] = array[mission, ...]

@@ -4,9 +4,12 @@ One measurement is a 3-D vector from the sensor to what it saw, three 32-bit num
 message opens with its sender's pose, five numbers: 160 bits. An announcement adds a viewpoint
 (position, yaw, pitch) with r̂ and α̂ (RochaMI), seven numbers: 384 bits in all. A summary of a map costs
 the bits of its bytes (`map_summary`). Where robots drift, each batch and each summary carries the covariance
-of its sender's pose, ten numbers: 320 bits more. A broadcast is charged once to its sender and once to each
-teammate that hears it. What reaches whom is a matter of distance, of
-free sight through the true world, or of a signal that walls weaken.
+of its sender's pose, ten numbers: 320 bits more. Where robots send by need each message carries a receipt for
+each teammate, the number of the latest message that was heard from it and flags for 32 before it: 48 bits;
+and a batch may hold measurements of earlier scans, each of which adds its pose.
+
+A broadcast is charged once to its sender and once to each teammate that hears it. What reaches whom is a
+matter of distance, of free sight through the true world, or of a signal that walls weaken.
 """
 
 from __future__ import annotations
@@ -30,7 +33,6 @@ from entropy_explore_env.belief.raycast import (
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.randomness import draw_uniform
 
-BITS_PER_MEASUREMENT = 96
 BITS_PER_BATCH = 160
 BITS_PER_ANNOUNCEMENT = 384
 BITS_PER_COVARIANCE = 320

@@ -9,6 +9,10 @@ from typing import Literal
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.validation import check, check_choice, check_count, check_kind, check_within
 
+BITS_PER_MEASUREMENT = 96
+BITS_PER_RECEIPT = 48
+"""In each message for each teammate, where robots send by need."""
+
 
 @dataclass(frozen=True)
 class Signal:
@@ -74,6 +78,9 @@ class Channel:
         loss_probability: Probability that a message is lost on its way to one teammate.
         delay_s: Time from sending to hearing, 0 to 3600.
         announcements: Whether robots announce the viewpoints that they choose.
+        order: Which measurements a robot sends first: `utility`, the most useful ones of its latest scan
+            (Rocha04, eq. 43); `need`, those of its latest scans that bring most to teammates which lack them,
+            as far as it knows by the receipts that all messages carry then (missions/need.py).
         phase_s: Length of a phase of the broadcast, 1e-3 to 3600; 0 = batches are sent at once.
         repeats: How often a phase's batches are sent in the next phase, evenly spread over it; 1e-3 s apart
             or more. 1 where batches are sent at once.
@@ -91,6 +98,7 @@ class Channel:
     loss_probability: float = 0.0
     delay_s: float = 0.0
     announcements: bool = True
+    order: Literal["utility", "need"] = "utility"
     phase_s: float = 0.0
     repeats: int = 1
 
@@ -106,6 +114,7 @@ class Channel:
             check(self, "i_min_bits", "above 0 where I_min is steered", lambda v: v > 0)
         check_within(self, "range_m", least=1e-9, most=1e6, inf=True)
         check_choice(self, "reach")
+        check_choice(self, "order")
         check_kind(self, "signal", Signal)
         check(self, "loss_probability", "a number from 0 to 1", lambda v: 0 <= v <= 1)
         check(self, "delay_s", "a number from 0 to 3600", lambda v: 0 <= v <= 3600)
@@ -114,6 +123,7 @@ class Channel:
         check_count(self, "repeats", 1, 1000)
         self._check_contents()
         self._check_phases()
+        self._check_order()
 
     def _check_contents(self) -> None:
         """Check that settings of summaries are given where robots send some, and only there."""
@@ -142,3 +152,15 @@ class Channel:
             raise SettingError("Channel.repeats", self.repeats, "so few that they are 1e-3 s apart or more")
         if self.delay_s > 0.0:
             raise SettingError("Channel.delay_s", self.delay_s, "0 where batches are broadcast in phases")
+
+    def _check_order(self) -> None:
+        """Check that robots which share by need send batches of measurements at once."""
+        if self.order == "utility":
+            return
+        if self.content == "summaries":
+            raise SettingError("Channel.order", self.order, "utility where robots send summaries")
+        if self.phase_s > 0.0:
+            raise SettingError("Channel.phase_s", self.phase_s, '0 where order="need": robots send at once')
+        if self.delay_s > 0.0:
+            allowed = '0 where order="need": receipts tell what was heard at once'
+            raise SettingError("Channel.delay_s", self.delay_s, allowed)

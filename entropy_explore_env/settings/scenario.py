@@ -12,7 +12,7 @@ import numpy as np
 
 from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.settings.action import Action
-from entropy_explore_env.settings.channel import Channel
+from entropy_explore_env.settings.channel import BITS_PER_MEASUREMENT, BITS_PER_RECEIPT, Channel
 from entropy_explore_env.settings.ending import SIGMA_PRIOR, Ending
 from entropy_explore_env.settings.faults import Faults
 from entropy_explore_env.settings.fiducials import Fiducials
@@ -34,6 +34,8 @@ MAX_BROADCASTS = 200_000
 """Broadcasts in phases within a step."""
 MAX_SCANS_UNDER_WAY = 20_000
 """Scans under way, straight across the workspace."""
+BACKLOG_SCANS = 64
+"""Scans of each robot that are kept where measurements are sent by need."""
 MAX_ACTIONS = 2**20
 """Discrete actions, counted with those in the corners beyond reach."""
 
@@ -114,6 +116,7 @@ class Scenario:
             self._check_kind(kind.robot)
             self._check_drives(kind)
         self._check_broadcasts()
+        self._check_receipts()
         self._check_faults()
         self._check_fiducials()
         allowed = f"a time so short that at most {MAX_MESSAGES} messages are under way at once"
@@ -153,6 +156,14 @@ class Scenario:
             allowed = f"at least a voxel ({self.grid.voxel_size_m} m) less than sensor_height_m"
             raise SettingError("Robot.above_ground_m", robot.above_ground_m, allowed)
 
+    def _check_receipts(self) -> None:
+        """Check that beside its receipts a message by need has room for a measurement."""
+        least = 1 + math.ceil((self.robots - 1) * BITS_PER_RECEIPT / BITS_PER_MEASUREMENT)
+        if self.backlog_scans and self.channel.burst < least:
+            allowed = f"0, or at least {least} where robots send by need: receipts for {self.robots - 1} "
+            allowed += "teammates take the bits of the others"
+            raise SettingError("Channel.burst", self.channel.burst, allowed)
+
     def _check_faults(self) -> None:
         """Check that faults are those of robots that there are, and fit the channel."""
         for part in self.faults.parts.values():
@@ -161,6 +172,9 @@ class Scenario:
                 raise SettingError(f"{type(part).__name__}.robots", part.robots, allowed)
         if self.faults.radio.late > 0.0 and self.channel.phase_s > 0.0:
             allowed = "0 where batches are broadcast in phases"
+            raise SettingError("RadioFault.late", self.faults.radio.late, allowed)
+        if self.faults.radio.late > 0.0 and self.channel.order == "need":
+            allowed = '0 where Channel.order is "need": receipts tell what was heard at once'
             raise SettingError("RadioFault.late", self.faults.radio.late, allowed)
 
     def _check_fiducials(self) -> None:
@@ -248,6 +262,12 @@ class Scenario:
     def shares_summaries(self) -> bool:
         """Whether robots send summaries of maps to each other."""
         return self.channel.content == "summaries" and self.channel.burst > 0 and self.robots > 1
+
+    @property
+    def backlog_scans(self) -> int:
+        """Scans of each robot that are kept to be sent by need; 0 where the latest is sent by utility."""
+        needed = self.channel.order == "need" and self.channel.burst > 0 and self.robots > 1
+        return BACKLOG_SCANS if needed else 0
 
     @property
     def batch_measurements(self) -> int:

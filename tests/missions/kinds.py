@@ -136,6 +136,14 @@ KINDS = {
             for name in "stopped blind_scans rays_lost messages_silenced messages_garbled".split()
         ),
     ),
+    "need": Kind(
+        free_box(
+            robots=3,
+            robot={"localization": DRIFT},
+            channel={"order": "need", "loss_probability": 0.5, "i_min_bits": 0.1, "i_min_fill": 0.5},
+        ),
+        lambda state: state.backlog_heard_s.any() and state.backlog_covariances.any(),
+    ),
     "candidates": Kind(CANDIDATES, lambda state: state.experience["decided_s"].any()),
     "planned paths": Kind(WANDERERS, lambda state: state.robots["corners"].any()),
     "decisions on scans": Kind(under_way("on_scan"), lambda state: state.robots["lead_s"].any()),

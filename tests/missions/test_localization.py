@@ -16,8 +16,9 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.missions.view_observation import ViewObserver
 from entropy_explore_env.reports.metrics import mission_figures
-from entropy_explore_env.robots.channel import BITS_PER_BATCH, BITS_PER_COVARIANCE, BITS_PER_MEASUREMENT
+from entropy_explore_env.robots.channel import BITS_PER_BATCH, BITS_PER_COVARIANCE
 from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.channel import BITS_PER_MEASUREMENT
 from entropy_explore_env.settings.json import scenario_of, settings_of
 from entropy_explore_env.settings.localization import Localization
 from entropy_explore_env.settings.robot_kind import RobotKind

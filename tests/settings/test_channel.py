@@ -20,6 +20,9 @@ SUMMARIES = {"content": "summaries"}
         ({**SUMMARIES, "phase_s": 1.0, "repeats": 2}, "phase_s", "0 where robots send summaries"),
         ({**SUMMARIES, "repeats": 2}, "repeats", "1 without phase_s: batches are sent at once, and once"),
         ({"repeats": 2}, "repeats", "1 without phase_s: batches are sent at once, and once"),
+        ({**SUMMARIES, "order": "need"}, "order", "utility where robots send summaries"),
+        ({"order": "need", "phase_s": 1.0}, "phase_s", '0 where order="need": robots send at once'),
+        ({"order": "need", "delay_s": 1.0}, "delay_s", '0 where order="need": receipts tell'),
         ({"summary_every_s": 5.0}, "summary_every_s", '10, its default, without content="summaries"'),
         (
             {"phase_s": 1.0, "summary_threshold_bits": 0.4},

@@ -23,11 +23,13 @@ def test_faults_are_those_of_robots_that_there_are(part):
         with_settings(TEAM, {"faults": {part: {"robots": (3,)}}})
 
 
-def test_late_messages_and_phases_do_not_go_together():
+def test_late_messages_go_neither_with_phases_nor_with_need():
     late = {"faults": {"radio": {"late": 0.1}}}
     assert with_settings(TEAM, late).message_slots > 0 == TEAM.message_slots
     with pytest.raises(SettingError, match=r"RadioFault.late = 0.1: expected 0 where batches"):
         with_settings(TEAM, {**late, "channel": {"phase_s": 2.0}})
+    with pytest.raises(SettingError, match=r"RadioFault.late = 0.1: expected 0 where Channel.order"):
+        with_settings(TEAM, {**late, "channel": {"order": "need"}})
     with pytest.raises(SettingError, match=r"RadioFault.late_s = 3600.0: expected a time so short"):
         with_settings(TEAM, {"faults": {"radio": {"late": 0.1, "late_s": 3600.0}}, "robots": 40})
 
