@@ -170,25 +170,6 @@ def test_a_damaged_file_is_compiled_anew(tmp_path):
     assert run(call, tmp_path) == "11.0 0"
 
 
-def test_bounds_are_checked_although_code_without_checks_is_on_disk(tmp_path):
-    made = tmp_path / "mine"
-    made.mkdir()
-    (made / "__init__.py").write_text("")
-    (made / "caller.py").write_text(
-        "from entropy_explore_env.compilation.kernels import lean_kernel\n\n\n"
-        "@lean_kernel\ndef inner(x, i):\n    return x[i]\n\n\n"
-        "@lean_kernel\ndef caller(x, i):\n    return inner(x, i)\n"
-    )
-    call = "import numpy\nfrom mine.caller import caller\ncaller(numpy.zeros(9)[:3], {})\n"
-    run(call.format(3), tmp_path, NUMBA_BOUNDSCHECK=None)  # reads beyond the end without a word
-    run(call.format(2), tmp_path, NUMBA_BOUNDSCHECK="1")
-    for _ in range(2):  # compiled, and from disk
-        process = start(call.format(3), tmp_path, NUMBA_BOUNDSCHECK="1")
-        _, err = process.communicate(timeout=120)
-        assert process.returncode == 1 and "IndexError" in err
-    run(call.format(3), tmp_path, NUMBA_BOUNDSCHECK="0")
-
-
 def test_a_lean_kernel_makes_no_array():
     @lean_kernel
     def careless():
@@ -196,12 +177,6 @@ def test_a_lean_kernel_makes_no_array():
 
     with pytest.raises(NumbaError, match="Only accept returning of array passed into the function"):
         careless()
-
-
-def test_without_numba_kernels_are_functions(tmp_path):
-    package(tmp_path)
-    code = "from mine.caller import caller; print(caller(1.0), type(caller).__name__)"
-    assert run(code, tmp_path, NUMBA_DISABLE_JIT="1") == "11.0 function"
 
 
 INTERPRETED = """

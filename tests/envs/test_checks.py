@@ -56,39 +56,37 @@ def test_a_number_outside_is_refused_wherever_it_stands(row: int, action: np.nda
     np.testing.assert_array_equal(caught.value.value, action)  # type: ignore[arg-type]
 
 
+NO_BOXES = (
+    *(None, "up", {}, object(), 0.0, np.zeros(4), np.zeros(6), np.zeros((1, 5)), np.zeros(5, int)),
+    *(np.zeros(5, bool), np.zeros(5, complex), np.zeros(5, object), np.zeros(5, "m8[s]")),
+    *([0.0, 0.0, 0.0, 0.0, None], [[0.0], [0.0, 0.0]]),
+)
+NO_NUMBERS = (
+    None,
+    "1",
+    -1,
+    7,
+    1.0,
+    np.float64(1),
+    np.nan,
+    True,
+    np.True_,
+    [1],
+    np.zeros(1, int),
+    np.array(1.0),
+)
+
+
 @pytest.mark.parametrize(
-    "action",
+    ("checker", "action", "said"),
     [
-        None,
-        "up",
-        {},
-        object(),
-        0.0,
-        np.zeros(4),
-        np.zeros(6),
-        np.zeros((1, 5)),
-        np.zeros(5, int),
-        np.zeros(5, bool),
-        np.zeros(5, complex),
-        np.zeros(5, object),
-        [0.0, 0.0, 0.0, 0.0, None],
-        [[0.0], [0.0, 0.0]],
-        np.zeros(5, "m8[s]"),
+        *((BOX, action, "5 floating-point numbers|in the shape of the action") for action in NO_BOXES),
+        *((DISCRETE, action, "a whole number from 0 to 6") for action in NO_NUMBERS),
     ],
 )
-def test_what_is_no_box_is_refused(action: Any) -> None:
-    with pytest.raises(ActionError, match=r"5 floating-point numbers|in the shape of the action") as caught:
-        BOX.one("robot_0", action)
-    assert caught.value.field == "actions[robot_0]"
-
-
-@pytest.mark.parametrize(
-    "action",
-    [None, "1", -1, 7, 1.0, np.float64(1), np.nan, True, np.True_, [1], np.zeros(1, int), np.array(1.0)],
-)
-def test_what_is_no_number_of_the_set_is_refused(action: Any) -> None:
-    with pytest.raises(ActionError, match="a whole number from 0 to 6") as caught:
-        DISCRETE.one("robot_0", action)
+def test_what_is_no_action_is_refused(checker: ActionChecker, action: Any, said: str) -> None:
+    with pytest.raises(ActionError, match=said) as caught:
+        checker.one("robot_0", action)
     assert caught.value.field == "actions[robot_0]"
 
 
@@ -132,35 +130,23 @@ def test_a_number_outside_is_named_in_a_table(entry: float) -> None:
     assert str(entry) in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "table",
-    [
-        None,
-        "up",
-        np.zeros((4, 2, 4)),
-        np.zeros((2, 4, 5)),
-        np.zeros((4, 2, 5), int),
-        np.zeros((4, 2, 5), object),
-        np.zeros((1, 4, 2, 5)),
-        np.zeros(40),
-        [[1.0], [1.0, 2.0]],
-    ],
+NO_TABLES_OF_BOXES = (
+    *(None, "up", np.zeros((4, 2, 4)), np.zeros((2, 4, 5)), np.zeros((4, 2, 5), int)),
+    *(np.zeros((4, 2, 5), object), np.zeros((1, 4, 2, 5)), np.zeros(40), [[1.0], [1.0, 2.0]]),
 )
-def test_what_is_no_table_of_boxes_is_refused(table: Any) -> None:
-    with pytest.raises(ActionError, match=r"of shape \(4, 2, 5\)|in the shape of the action"):
-        BOX.table(table, 4, 2)
+NO_TABLES_OF_NUMBERS = (
+    *(np.zeros((4, 2)), np.full((4, 2), -1), np.full((4, 2), 7), np.zeros((2, 4), int)),
+    np.zeros((4, 2), bool),
+)
 
 
 @pytest.mark.parametrize(
-    "table",
+    ("checker", "table", "said"),
     [
-        np.zeros((4, 2)),
-        np.full((4, 2), -1),
-        np.full((4, 2), 7),
-        np.zeros((2, 4), int),
-        np.zeros((4, 2), bool),
+        *((BOX, table, r"of shape \(4, 2, 5\)|in the shape of the action") for table in NO_TABLES_OF_BOXES),
+        *((DISCRETE, table, "whole numbers") for table in NO_TABLES_OF_NUMBERS),
     ],
 )
-def test_what_is_no_table_of_numbers_is_refused(table: np.ndarray) -> None:
-    with pytest.raises(ActionError, match="whole numbers"):
-        DISCRETE.table(table, 4, 2)
+def test_what_is_no_table_of_actions_is_refused(checker: ActionChecker, table: Any, said: str) -> None:
+    with pytest.raises(ActionError, match=said):
+        checker.table(table, 4, 2)

@@ -109,15 +109,6 @@ def test_limits_truncate(settings: dict[str, Any], end: str, steps: int) -> None
     assert infos["robot_0"]["time_s"] == settings.get("time_limit_s", 7.0)
 
 
-def test_a_step_lasts_one_period_or_until_the_next_robot_decides() -> None:
-    for period in (0.5, 2.0):
-        team = parallel_env(BOX, decision_period_s=period, max_cycles=10)
-        times = [result[4]["robot_0"]["time_s"] for result in played(team)]
-        assert times == [period * n for n in range(1, 11)]
-    for _, _, _, _, infos in played(parallel_env(BOX, robots=3, decision_period_s=None, max_cycles=30)):
-        assert any(info["deciding"] for info in infos.values())
-
-
 @pytest.mark.parametrize("kind", ["individual", "team"])
 def test_rewards_are_bits_gained_as_shares_of_all_bits(kind: str) -> None:
     """H(0) - H_th is V log2(30 / 0.03): every voxel of the box can be seen."""

@@ -35,7 +35,6 @@ def check_goals(scenario, decisions, **world):
 @pytest.mark.parametrize(
     ("world", "scenario", "settings"),
     [
-        (None, "office", SEEN),
         (None, "cave", SEEN),
         ("warehouse", "office", SEEN),
         ("geb079", "office-3d", {}),

@@ -20,19 +20,6 @@ ENDLESS = {"sigma_end": 1e-4}
 NO_PARTS = {"panorama": False, "self_state": False, "team": False}
 
 
-@pytest.mark.parametrize("world", ["empty", "furnished"])
-def test_round_numbers_do_not_bring_robots_into_walls_and_furniture(world):
-    """Displacements of quarters of the reach end on faces between voxels, exactly."""
-    missions = started(free_box(robots=1, world=world, observation=NO_PARTS), seed=6)
-    truth, rng = missions.state.truth[0].reshape(missions.grid.shape), np.random.default_rng(0)
-    for _ in range(200):
-        boxes = rng.choice([-1.0, -0.5, -0.25, 0.0, 0.25, 0.5, 1.0], (1, 1, 5))
-        missions.step(boxes, np.zeros((1, 1), np.int64))
-        voxel = missions.grid.voxel_of(missions.state.robots[0, 0]["goal"][:3])
-        assert ((voxel >= 0) & (voxel < missions.grid.shape)).all()
-        assert truth[tuple(voxel)] == 0.0
-
-
 def crowded(**changes):
     """Five robots that wander in each other's way for ever."""
     made = free_box(robots=5, world="furnished", observation=NO_PARTS)

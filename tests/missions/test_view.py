@@ -11,7 +11,7 @@ import pytest
 from entropy_explore_env import EntropyExploreVectorEnv, parallel_env
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
-from tests.reference.scenes import free_box, standing, started, wander
+from tests.reference.scenes import free_box, started, wander
 
 
 def test_a_view_shows_the_robot_s_own_state():
@@ -57,20 +57,6 @@ def test_a_view_before_anything_was_measured_or_heard():
     assert (view.teammates[1].heard_s, view.teammates[1].announced_s) == (-1.0, -1.0)
     assert not view.teammates[1].viewpoint.any()
     assert view.deciding
-
-
-@pytest.mark.parametrize("kind", ["continuous", "discrete"])
-def test_the_action_for_a_viewpoint_goes_there(kind):
-    missions = standing((1.75, 2.75, 1.25, 0.0, 0.0), action={"kind": kind})
-    wanted = np.array([2.25, 2.25, 1.25, np.pi / 2, np.pi / 4])
-    action = view_of(missions, 0, 0).action_for(wanted)
-    boxes, numbers = np.zeros((1, 1, 5)), np.zeros((1, 1), np.int64)
-    if kind == "continuous":
-        boxes[0, 0] = action
-    else:
-        numbers[0, 0] = action
-    missions.step(boxes, numbers)
-    assert missions.state.robots[0, 0]["goal"] == pytest.approx(wanted, abs=1e-6)
 
 
 def test_texts_of_views_and_spaces_are_short() -> None:
