@@ -56,11 +56,12 @@ def test_a_number_outside_is_refused_wherever_it_stands(row: int, action: np.nda
     np.testing.assert_array_equal(caught.value.value, action)  # type: ignore[arg-type]
 
 
-NO_BOXES = (
-    *(None, "up", {}, object(), 0.0, np.zeros(4), np.zeros(6), np.zeros((1, 5)), np.zeros(5, int)),
-    *(np.zeros(5, bool), np.zeros(5, complex), np.zeros(5, object), np.zeros(5, "m8[s]")),
-    *([0.0, 0.0, 0.0, 0.0, None], [[0.0], [0.0, 0.0]]),
-)
+RAGGED = [[0.0], [0.0, 0.0]]
+NO_BOXES = [
+    *(np.zeros(shape) for shape in (4, 6, (1, 5))),
+    *(np.zeros(5, kind) for kind in (int, bool, complex, object, "m8[s]")),
+    *(None, "up", {}, object(), 0.0, [0.0, 0.0, 0.0, 0.0, None], RAGGED),
+]
 NO_NUMBERS = (
     None,
     "1",
@@ -130,14 +131,16 @@ def test_a_number_outside_is_named_in_a_table(entry: float) -> None:
     assert str(entry) in str(caught.value)
 
 
-NO_TABLES_OF_BOXES = (
-    *(None, "up", np.zeros((4, 2, 4)), np.zeros((2, 4, 5)), np.zeros((4, 2, 5), int)),
-    *(np.zeros((4, 2, 5), object), np.zeros((1, 4, 2, 5)), np.zeros(40), [[1.0], [1.0, 2.0]]),
-)
-NO_TABLES_OF_NUMBERS = (
-    *(np.zeros((4, 2)), np.full((4, 2), -1), np.full((4, 2), 7), np.zeros((2, 4), int)),
-    np.zeros((4, 2), bool),
-)
+NO_TABLES_OF_BOXES = [
+    *(np.zeros(shape) for shape in ((4, 2, 4), (2, 4, 5), (1, 4, 2, 5), 40)),
+    *(np.zeros((4, 2, 5), kind) for kind in (int, object)),
+    *(None, "up", RAGGED),
+]
+NO_TABLES_OF_NUMBERS = [
+    *(np.zeros((4, 2), kind) for kind in (float, bool)),
+    *(np.full((4, 2), number) for number in (-1, 7)),
+    np.zeros((2, 4), int),
+]
 
 
 @pytest.mark.parametrize(
