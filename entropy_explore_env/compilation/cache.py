@@ -14,6 +14,7 @@ import pickle
 import pkgutil
 import re
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +27,8 @@ from entropy_explore_env.compilation.folder import (
     SUFFIX,
     kernel_folder,
     mark_used,
-    partial_name,
     remove_old_kernels,
+    write_whole,
 )
 from entropy_explore_env.compilation.numba_parts import CODE_SETTINGS, Dispatcher, config, dumps, sigutils
 from entropy_explore_env.compilation.stamps import NoStampError, describe_type, stamp
@@ -38,6 +39,7 @@ _COMPILED_BY = hashlib.sha256(
 ).hexdigest()
 """A digest of the files that say how kernels are compiled, as they are when they are imported."""
 _DIGEST_BYTES = 32
+_clean_up_once = cache(remove_old_kernels)
 
 
 class KernelCache:
@@ -53,16 +55,26 @@ class KernelCache:
         """Read and write nothing yet."""
         self.kernel, self._form, self._kept = kernel, form, kept
 
-    def name_of(self, sig: Any, target: Any) -> str | None:  # noqa: ANN401 - a signature, a target context
-        """Return a digest of what the code for these types depends on; None = that is not known."""
+    def name_of(self, sig: Any, target: Any) -> tuple[str | None, int]:  # noqa: ANN401 - as Numba has them
+        """Return a digest of what the code for these types depends on, and of how many kernels it is made.
+
+        Args:
+            sig: Types of arguments, or a signature.
+            target: The target context.
+
+        Returns:
+            (digest, kernels); (None, 0) where the digest is not known.
+        """
         try:
-            args, returned = _normal(sig)
-            described = [stamp(self.kernel), *map(describe_type, args), str(returned)]
+            (made_of, kernels), (args, returned) = stamp(self.kernel), _normal(sig)
+            described = [made_of, *map(describe_type, args), str(returned)]
         except NoStampError as error:
             announcement.explain_no_stamp(str(error))
-            return None
-        described += [self._form, repr(target.codegen().magic_tuple()), *_environment()]
-        return hashlib.sha256("\n".join(described).encode()).hexdigest()[:40]
+            return None, 0
+        versions = numba.__version__, llvmlite.__version__, np.__version__, sys.implementation.cache_tag
+        settings = [getattr(config, name, None) for name in CODE_SETTINGS]
+        described += [self._form, repr((target.codegen().magic_tuple(), _COMPILED_BY, versions, settings))]
+        return hashlib.sha256("\n".join(described).encode()).hexdigest()[:40], kernels
 
     def path_of(self, name: str | None) -> Path | None:
         """Return the file of the code with this digest; None = it is not kept."""
@@ -82,10 +94,12 @@ class KernelCache:
 
 def load(path: Path | None, sig: Any) -> Any:  # noqa: ANN401 - a signature; what a result of compiling reduces to
     """Return what was written into a file for a signature; None = nothing, or something else."""
-    if path is None:
+    try:
+        content = b"" if path is None else path.read_bytes()
+    except OSError:
         return None
-    data = _read(path)
-    if data is None:
+    data = content[_DIGEST_BYTES:]
+    if path is None or hashlib.sha256(data).digest() != content[:_DIGEST_BYTES]:
         return None
     kept_sig, reduced = pickle.loads(data)
     if kept_sig != _normal(sig):
@@ -99,51 +113,15 @@ def save(path: Path | None, sig: Any, result: Any) -> None:  # noqa: ANN401 - a 
     if path is None or result.library.has_dynamic_globals or result.lifted:
         return
     result.target_context.refresh()
+    data = dumps((_normal(sig), result._reduce()))
     try:
-        _write(path, dumps((_normal(sig), result._reduce())))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _clean_up_once(path.parent)
+        write_whole(path, hashlib.sha256(data).digest() + data)
     except OSError as error:
         announcement.explain_not_kept(path.parent, error)
-
-
-def _environment() -> list[str]:
-    """Return what else the code depends on."""
-    versions = (
-        _COMPILED_BY,
-        numba.__version__,
-        llvmlite.__version__,
-        np.__version__,
-        sys.implementation.cache_tag,
-    )
-    return [repr(versions), repr([getattr(config, name, None) for name in CODE_SETTINGS])]
 
 
 def _normal(sig: Any) -> Any:  # noqa: ANN401
     args, returned = sigutils.normalize_signature(sig)
     return tuple(args), returned
-
-
-def _read(path: Path) -> bytes | None:
-    """Return what `_write` wrote; None where there is nothing, or something else."""
-    try:
-        content = path.read_bytes()
-    except OSError:
-        return None
-    data = content[_DIGEST_BYTES:]
-    return data if hashlib.sha256(data).digest() == content[:_DIGEST_BYTES] else None
-
-
-_cleaned: set[Path] = set()
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Write a file as a whole or not at all; the first of a process removes old ones."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if path.parent not in _cleaned:
-        _cleaned.add(path.parent)
-        remove_old_kernels(path.parent)
-    part = partial_name(path)
-    try:
-        part.write_bytes(hashlib.sha256(data).digest() + data)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)

@@ -12,12 +12,11 @@ import gc
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import IO, Any
 
 from entropy_explore_env.compilation import announcement, cache, second_process
-from entropy_explore_env.compilation.folder import kernel_folder
+from entropy_explore_env.compilation.folder import claim, kernel_folder, release
 from entropy_explore_env.compilation.libraries import InnerLowering, OuterLowering, rebuilt_inner
-from entropy_explore_env.compilation.locks import Claim, claim
 from entropy_explore_env.compilation.numba_parts import (
     UNUSED_PASSES,
     AnalysisPass,
@@ -33,12 +32,16 @@ from entropy_explore_env.compilation.numba_parts import (
     type_inference_stage,
     types,
 )
-from entropy_explore_env.compilation.stamps import forget_parts, tree_size
+from entropy_explore_env.compilation.stamps import forget_digests
 
 _WRAPPERS = {"no_cfunc_wrapper": True}
 _NO_WRAPPERS = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
 _WORTH_DIVIDING = 10
-"""Trees of at least this many kernels are compiled by two processes: to divide the work costs time, too."""
+"""Trees of at least this many kernels are compiled by two processes: to divide the work costs time, too.
+
+Whatever calls a tree that is divided has to be divided, too: until the outermost inference ends, Numba keeps
+what a survey could not resolve.
+"""
 
 
 class _Compiling:
@@ -46,11 +49,11 @@ class _Compiling:
 
     def __init__(self, form: _Form, sig: Any) -> None:  # noqa: ANN401 - types or a signature
         self.form, self.sig = form, sig
-        self.name = form.disk.name_of(sig, form.targetctx)
+        self.name, self.tree_size = form.disk.name_of(sig, form.targetctx)
         """The digest in the name of its file, which its symbols bear too: Numba numbers functions as they
         come, so that code from another process may bear the number of another function of this one."""
         self.path = form.disk.path_of(self.name)
-        self.claim: Claim | None = None
+        self.claim: IO[bytes] | None = None
 
 
 class _State(threading.local):
@@ -77,7 +80,7 @@ def _compiling(form: _Form, sig: Any) -> Iterator[_Compiling]:  # noqa: ANN401 -
     """
     outermost = not _state.kernels
     if outermost:
-        forget_parts()
+        forget_digests()
     if any(compiling.form.py_func is form.py_func for compiling in _state.kernels):
         raise errors.TypingError(
             f"kernel {form.py_func.__qualname__} calls itself; Numba's own njit allows that"
@@ -92,53 +95,15 @@ def _compiling(form: _Form, sig: Any) -> Iterator[_Compiling]:  # noqa: ANN401 -
         yield compiling
     finally:
         _state.kernels.pop()
-        if compiling.claim is not None:
-            compiling.claim.release()
+        release(compiling.claim)
         if collecting:
-            if not gc.get_freeze_count():  # what is left joins the oldest objects unexamined
-                gc.freeze()
-                gc.unfreeze()
             gc.enable()
-
-
-class KernelFlags(compiler.Flags):
-    """Numba's options of a function, which it compares with every call that it resolves: by identity here."""
-
-    __slots__ = ("_copy", "_hash")
-
-    def __hash__(self) -> int:
-        """Return the hash of the options as they were first asked for it."""
-        if not hasattr(self, "_hash"):
-            self._hash = super().__hash__()
-        return self._hash
-
-    def __eq__(self, other: object) -> bool:
-        """Return whether all options are the same."""
-        return self is other or super().__eq__(other)
-
-    def copy(self) -> KernelFlags:
-        """Return a copy, the same one each time."""
-        if not hasattr(self, "_copy"):
-            self._copy = super().copy()
-        return self._copy
-
-
-_known_flags: dict[KernelFlags, KernelFlags] = {}
-
-
-def _shared_flags(flags: compiler.Flags) -> KernelFlags:
-    """Return the one object for these options."""
-    own = KernelFlags(flags)
-    return _known_flags.setdefault(own, own)
 
 
 class KernelCompiler(compiler.Compiler):
     """Numba's compiler; other kernels that it calls come first, and symbols get the name of the file."""
 
-    @property
-    def lowering(self) -> type[NativeLowering]:
-        """The pass that makes LLVM's code."""
-        return OuterLowering
+    lowering: type[NativeLowering] = OuterLowering
 
     def define_pipelines(self) -> list[PassManager]:
         """Return Numba's passes and one more."""
@@ -163,10 +128,7 @@ class KernelCompiler(compiler.Compiler):
 class InnerKernelCompiler(KernelCompiler):
     """The same, up to the intermediate code, without passes that lean kernels have no use for."""
 
-    @property
-    def lowering(self) -> type[NativeLowering]:
-        """The pass that makes LLVM's code."""
-        return InnerLowering
+    lowering = InnerLowering
 
     def passes_from(self, passes: list[tuple[Any, str]]) -> Iterator[tuple[Any, str]]:
         """Yield the passes, each with a text."""
@@ -189,7 +151,7 @@ class CalleesFirst(AnalysisPass):
     def run_pass(self, state: Any) -> bool:  # noqa: ANN401 - Numba's bag of everything
         """Go through the calls whose types are known, again while there are new ones."""
         compiling, tried = _state.kernels[-1], set()
-        divided = second_process.shared() and tree_size(compiling.form.disk.kernel) >= _WORTH_DIVIDING
+        divided = second_process.shared() and compiling.tree_size >= _WORTH_DIVIDING
         while divided and (calls := [call for call in _survey(state) if call not in tried]):
             tried.update(calls)
             for kernel, args in reversed(calls) if second_process.serves() else calls:
@@ -253,9 +215,6 @@ class _Form(CPUDispatcher):
             result = self._compiler.compile(args, return_type)
         except _CompiledElsewhereError as found:
             return self._rebuilt(found.args[0])
-        except errors.ForceLiteralArg as request:
-            fold = self._compiler.fold_argument_types
-            raise request.bind_fold_arguments(lambda args, kws: fold(args, kws)[1]) from None
         cache.save(compiling.path, compiling.sig, result)
         return result
 
@@ -263,7 +222,7 @@ class _Form(CPUDispatcher):
         """Whether it is compiled for these types, here or on disk: then it is taken from there."""
         if args in self.overloads:
             return True
-        reduced = cache.load(self.disk.path_of(self.disk.name_of(args, self.targetctx)), args)
+        reduced = cache.load(self.disk.path_of(self.disk.name_of(args, self.targetctx)[0]), args)
         if reduced is not None:
             self._keep(self._rebuilt(reduced))
         return reduced is not None
@@ -284,7 +243,6 @@ class InnerKernel(_Form):
         """Make the inner form of a kernel."""
         options = {**kernel.targetoptions, **_NO_WRAPPERS}
         super().__init__(kernel.py_func, {}, options, InnerKernelCompiler)
-        self._compiler._customize_flags = _shared_flags
         self.disk = cache.KernelCache(kernel, "inner", kept=not options.get("forceinline", False))
 
     @property

@@ -1,26 +1,36 @@
-"""Where compiled kernels are kept, and how long."""
+"""Where compiled kernels are kept, how long, and which process compiles one that several need at once."""
 
 from __future__ import annotations
 
 import os
-import sys
 import time
-from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
+from types import ModuleType
+from typing import IO
+
+import platformdirs
 
 from entropy_explore_env.compilation.numba_parts import config
 
+fcntl: ModuleType | None
+try:
+    import fcntl
+except ImportError:  # on Windows
+    fcntl = None
+
 FOLDER = "entropy_explore_env"
-SUFFIX = ".kernel"
-CLAIM = ".claim"
-"""Of the files that processes lock while they compile a kernel."""
+SUFFIX, _CLAIM, _PARTIAL = ".kernel", ".claim", ".part"
+"""Of kernels, of files that processes lock while they compile one, and of files that are being written."""
 MAX_DAYS = 90.0
 """Kernels that no process has used for as long are removed."""
 MAX_BYTES = 1 << 30
 """With more, those which were used longest ago are removed, until half of it is left."""
 
 _DAY_S = 86400.0
-_PARTIAL = ".part"
+_PATIENCE_S = 60.0
+"""A process that was stopped holds others up no longer than this: no kernel takes half as long."""
+_PAUSE_S = 0.01
 
 
 def kernel_folder() -> Path | None:
@@ -32,47 +42,57 @@ def kernel_folder() -> Path | None:
     named = getattr(config, "CACHE_DIR", "")  # Numba sets its settings by name
     if named:
         return Path(named) / FOLDER
-    try:
-        home = Path.home()
-    except RuntimeError:
-        home = None
-    found = user_cache_folder(sys.platform, os.environ, home)
-    return None if found is None else found / FOLDER / "kernels"
+    found = Path(platformdirs.user_cache_dir(FOLDER, appauthor=False)) / "kernels"
+    return found if found.is_absolute() else None
 
 
-def user_cache_folder(platform: str, environment: Mapping[str, str], home: Path | None) -> Path | None:
-    """Where programs keep what they can make again: the convention of each system.
+def claim(kernel: Path) -> IO[bytes] | None:
+    """Wait until no other process compiles a kernel, given by its file, and claim it.
 
-    Args:
-        platform: As `sys.platform`.
-        environment: As `os.environ`.
-        home: The user's folder; None = not known.
+    A claim is a lock on a file beside the kernel's own. The system lets go of it when its process ends.
+
+    Returns:
+        What `release` takes; None where there are no such locks, where the folder cannot be written, or where
+        others keep the claim for too long.
     """
-    if platform == "win32":
-        local = environment.get("LOCALAPPDATA")
-        if local:
-            return Path(local)
-        return None if home is None else home / "AppData" / "Local"
-    if platform == "darwin":
-        return None if home is None else home / "Library" / "Caches"
-    named = environment.get("XDG_CACHE_HOME", "")
-    if Path(named).is_absolute():  # the convention wants others to be ignored
-        return Path(named)
-    return None if home is None else home / ".cache"
+    if fcntl is None:
+        return None
+    until_s = time.monotonic() + _PATIENCE_S
+    with suppress(OSError):
+        kernel.parent.mkdir(parents=True, exist_ok=True)
+        held = kernel.with_suffix(_CLAIM).open("wb")
+        while time.monotonic() < until_s:
+            try:
+                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                return held
+            except BlockingIOError:
+                time.sleep(_PAUSE_S)
+        held.close()
+    return None
 
 
-def partial_name(path: Path) -> Path:
-    """Return a name that no other process takes, for a file that is being written."""
-    return path.with_name(f"{path.name}.{os.getpid()}-{time.monotonic_ns():x}{_PARTIAL}")
+def release(held: IO[bytes] | None) -> None:
+    """Let others have a claim; what they find now is the kernel on disk."""
+    if held is not None:
+        Path(held.name).unlink(missing_ok=True)
+        held.close()
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file as a whole or not at all."""
+    part = path.with_name(f"{path.name}.{os.getpid()}-{time.monotonic_ns():x}{_PARTIAL}")
+    try:
+        part.write_bytes(data)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def mark_used(path: Path) -> None:
     """Note that a kernel is in use, once a day."""
-    try:
+    with suppress(OSError):  # it belongs to someone else, or has just been removed
         if time.time() - path.stat().st_mtime > _DAY_S:
             os.utime(path)
-    except OSError:  # it belongs to someone else, or has just been removed
-        pass
 
 
 def remove_old_kernels(folder: Path, max_bytes: int = MAX_BYTES) -> None:
@@ -80,37 +100,20 @@ def remove_old_kernels(folder: Path, max_bytes: int = MAX_BYTES) -> None:
 
     Other processes may be doing the same. A process that misses a kernel compiles it.
     """
-    now = time.time()
-    kept: list[tuple[float, int, Path]] = []
-    for entry in _entries(folder):
-        try:
-            status = entry.stat()
-        except OSError:
-            continue
-        age_s = now - status.st_mtime
-        if age_s > (MAX_DAYS * _DAY_S if entry.suffix == SUFFIX else _DAY_S):
-            _remove(entry)
-        elif entry.suffix == SUFFIX:
-            kept.append((status.st_mtime, status.st_size, entry))
+    now, kept = time.time(), []
+    for suffix, days in ((SUFFIX, MAX_DAYS), (_CLAIM, 1.0), (_PARTIAL, 1.0)):
+        for path in folder.glob(f"*{suffix}"):
+            with suppress(OSError):  # another process was faster; or, on Windows, reads it
+                status = path.stat()
+                if now - status.st_mtime > days * _DAY_S:
+                    path.unlink()
+                elif suffix == SUFFIX:
+                    kept.append((status.st_mtime, status.st_size, path))
     total = sum(size for _, size, _ in kept)
     if total <= max_bytes:
         return
     for _, size, path in sorted(kept):
-        _remove(path)
-        total -= size
-        if total <= max_bytes // 2:
-            return
-
-
-def _entries(folder: Path) -> list[Path]:
-    try:
-        return [entry for entry in folder.iterdir() if entry.suffix in (SUFFIX, CLAIM, _PARTIAL)]
-    except OSError:
-        return []
-
-
-def _remove(path: Path) -> None:
-    try:
-        path.unlink(missing_ok=True)
-    except OSError:  # Windows does not remove what another process reads
-        pass
+        if total > max_bytes // 2:
+            with suppress(OSError):
+                path.unlink()
+            total -= size

@@ -12,7 +12,7 @@ from numba import typeof
 from entropy_explore_env.compilation import second_process
 from entropy_explore_env.compilation.dispatchers import Kernel
 from entropy_explore_env.compilation.numba_parts import config
-from entropy_explore_env.compilation.stamps import forget_parts
+from entropy_explore_env.compilation.stamps import forget_digests
 
 ASSERTING = os.environ.get("ENTROPY_EXPLORE_ASSERT", "0") != "0"
 """Whether kernels assert what holds unless they are wrong, such as that every event of a mission is used up.
@@ -92,7 +92,7 @@ def compile_ahead(calls: Iterable[tuple[Any, tuple[Any, ...]]]) -> None:
     Args:
         calls: Kernels, each with arguments of the types that it will be called with.
     """
-    forget_parts()
+    forget_digests()
     missing = []
     for compiled, arguments in calls:
         if not isinstance(compiled, Kernel):  # compiling is switched off

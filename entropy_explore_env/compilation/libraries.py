@@ -117,20 +117,17 @@ def rebuilt_inner(target_context: Any, reduced: tuple[Any, ...]) -> compiler.Com
     )
     for function in reload_init:
         function()
-    return compiler.CompileResult(
+    return compiler.compile_result(
         typing_context=target_context.typing_context,
         target_context=target_context,
         entry_point=object(),
-        typing_error=None,
         type_annotation=annotation,
         signature=signature,
         objectmode=objectmode,
         lifted=lifted,
         fndesc=fndesc,
         library=InnerLibrary.from_bitcode(target_context.codegen(), library),
-        call_helper=None,
         environment=environment,
-        metadata=None,
         reload_init=reload_init,
         referenced_envs=environments,
     )

@@ -6,35 +6,22 @@ pyproject.toml bounds Numba's versions to those that were tested.
 
 from __future__ import annotations
 
-from numba.core import compiler, config, errors, sigutils, types
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.compiler_machinery import AnalysisPass, PassManager, register_pass
-from numba.core.dispatcher import Dispatcher
-from numba.core.registry import CPUDispatcher
-from numba.core.serialize import dumps
-from numba.core.typed_passes import NativeLowering, NopythonTypeInference, type_inference_stage
-
-__all__ = [
-    "CODE_SETTINGS",
-    "UNUSED_PASSES",
-    "AnalysisPass",
-    "CPUDispatcher",
-    "Dispatcher",
-    "JITCodeLibrary",
-    "NativeLowering",
-    "NopythonTypeInference",
-    "PassManager",
-    "compiler",
-    "config",
-    "dumps",
-    "errors",
-    "global_compiler_lock",
-    "register_pass",
-    "sigutils",
-    "type_inference_stage",
-    "types",
-]
+from numba.core import compiler as compiler
+from numba.core import config as config
+from numba.core import errors as errors
+from numba.core import sigutils as sigutils
+from numba.core import types as types
+from numba.core.codegen import JITCodeLibrary as JITCodeLibrary
+from numba.core.compiler_lock import global_compiler_lock as global_compiler_lock
+from numba.core.compiler_machinery import AnalysisPass as AnalysisPass
+from numba.core.compiler_machinery import PassManager as PassManager
+from numba.core.compiler_machinery import register_pass as register_pass
+from numba.core.dispatcher import Dispatcher as Dispatcher
+from numba.core.registry import CPUDispatcher as CPUDispatcher
+from numba.core.serialize import dumps as dumps
+from numba.core.typed_passes import NativeLowering as NativeLowering
+from numba.core.typed_passes import NopythonTypeInference as NopythonTypeInference
+from numba.core.typed_passes import type_inference_stage as type_inference_stage
 
 CODE_SETTINGS = (
     "OPT",

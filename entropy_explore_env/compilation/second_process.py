@@ -13,29 +13,26 @@ import importlib
 import multiprocessing
 import os
 import pickle
-import queue
 import signal
 import subprocess
 import sys
-import threading
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
-from entropy_explore_env.compilation import locks
-from entropy_explore_env.compilation.folder import kernel_folder
+from entropy_explore_env.compilation.folder import fcntl, kernel_folder
 from entropy_explore_env.compilation.numba_parts import config, dumps
 
-_IDLE_S = 30.0
+_IDLE_S = 30
 _CODE = "from entropy_explore_env.compilation.second_process import serve; serve()"
 
 
 class _Helper:
     """The helper of this process, as far as there is one."""
 
-    def __init__(self) -> None:
-        self.process: subprocess.Popen[bytes] | None = None
-        self.serving = False
+    process: subprocess.Popen[bytes] | None = None
+    serving = False
 
     def runs(self) -> bool:
         """Whether a helper is at work."""
@@ -64,16 +61,20 @@ def send(kernels: Iterable[tuple[Any, tuple[Any, ...]]], *, start: bool = False)
     """
     if start and not _helper.runs() and _is_wanted():
         _start()
-    if _helper.runs():
+    process = _helper.process
+    if process is None or process.stdin is None or not _helper.runs():
+        return
+    with suppress(OSError, ValueError):  # it has ended
         for kernel, types in kernels:
             function = kernel.py_func
-            _tell((function.__module__, function.__qualname__, types))
+            process.stdin.write(dumps((function.__module__, function.__qualname__, types)))
+        process.stdin.flush()
 
 
 def _is_wanted() -> bool:
     """Whether a second process has a processor to run on, and can tell this one what it compiled."""
     main = multiprocessing.parent_process() is None and not _helper.serving
-    return main and locks.fcntl is not None and kernel_folder() is not None and _processors() > 1
+    return main and fcntl is not None and kernel_folder() is not None and _processors() > 1
 
 
 def _processors() -> int:
@@ -81,61 +82,30 @@ def _processors() -> int:
 
 
 def _start() -> None:
-    try:
+    """Start a helper that finds modules where this process does, and keeps kernels there."""
+    modules = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)
+    folder = str(getattr(config, "CACHE_DIR", ""))
+    with suppress(OSError):
         _helper.process = subprocess.Popen(
             [sys.executable, "-c", _CODE],
-            env=_environment(),
+            env={**os.environ, "PYTHONPATH": modules, "NUMBA_CACHE_DIR": folder},
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
-    except OSError:
-        return
-    atexit.register(_stop, _helper.process)
-
-
-def _environment() -> dict[str, str]:
-    """Return the variables of this process, where it finds its modules and where it keeps kernels."""
-    modules = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)
-    folder = getattr(config, "CACHE_DIR", "")
-    return {**os.environ, "PYTHONPATH": modules, **({"NUMBA_CACHE_DIR": str(folder)} if folder else {})}
-
-
-def _stop(process: subprocess.Popen[bytes]) -> None:
-    process.kill()
-    process.communicate()
-
-
-def _tell(request: tuple[str, str, tuple[Any, ...]]) -> None:
-    assert _helper.process is not None and _helper.process.stdin is not None
-    try:
-        _helper.process.stdin.write(dumps(request))
-        _helper.process.stdin.flush()
-    except (OSError, ValueError):  # it has ended
-        _helper.process.kill()
+        atexit.register(_helper.process.kill)
 
 
 def serve() -> None:
     """Compile what standard input asks for, until it ends."""
     _helper.serving = True
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    requests: queue.SimpleQueue[tuple[str, str, Any]] = queue.SimpleQueue()
-    threading.Thread(target=_read, args=(sys.stdin.buffer, requests), daemon=True).start()
     while True:
+        signal.alarm(_IDLE_S)  # which ends the process
         try:
-            module, name, types = requests.get(timeout=_IDLE_S)
-        except queue.Empty:
+            module, name, types = pickle.load(sys.stdin.buffer)
+        except Exception:  # the other process has ended
             return
-        try:
+        signal.alarm(0)
+        with suppress(Exception):  # the process that asked for it meets the same and says so
             getattr(importlib.import_module(module), name).compile(types)
-        except Exception:  # the process that asked for it meets the same and says so
-            continue
-
-
-def _read(stream: IO[bytes], requests: queue.SimpleQueue[tuple[str, str, Any]]) -> None:
-    """Take requests; the process ends with the one that makes them."""
-    while True:
-        try:
-            requests.put(pickle.load(stream))
-        except Exception:
-            os._exit(0)

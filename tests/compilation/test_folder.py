@@ -3,44 +3,26 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
+import threading
 import time
 from pathlib import Path
 
-import pytest
 from numba.core import config
 
 from entropy_explore_env.compilation import folder
-from entropy_explore_env.compilation.folder import kernel_folder, remove_old_kernels, user_cache_folder
+from entropy_explore_env.compilation.folder import claim, kernel_folder, release, remove_old_kernels
+from tests.systems import needs_posix
 
-HOME = Path("/home/user")
+HOLD = "import sys; from pathlib import Path; from entropy_explore_env.compilation.folder import claim\n"
+HOLD += "held = claim(Path(sys.argv[1])); print('held', flush=True); sys.stdin.read()"
 DAY_S = 86400.0
 
 
-@pytest.mark.parametrize(
-    "platform, environment, expected",
-    [
-        ("linux", {}, HOME / ".cache"),
-        ("linux", {"XDG_CACHE_HOME": "/scratch"}, Path("/scratch")),
-        ("linux", {"XDG_CACHE_HOME": "relative"}, HOME / ".cache"),
-        ("linux", {"XDG_CACHE_HOME": "", "LOCALAPPDATA": "/no"}, HOME / ".cache"),
-        ("freebsd14", {}, HOME / ".cache"),
-        ("darwin", {"XDG_CACHE_HOME": "/scratch"}, HOME / "Library" / "Caches"),
-        ("win32", {"LOCALAPPDATA": "/users/user/local"}, Path("/users/user/local")),
-        ("win32", {"XDG_CACHE_HOME": "/scratch"}, HOME / "AppData" / "Local"),
-    ],
-)
-def test_each_system_has_its_folder(platform, environment, expected):
-    assert user_cache_folder(platform, environment, HOME) == expected
-
-
-@pytest.mark.parametrize("platform", ["linux", "darwin", "win32"])
-def test_a_user_without_a_home_has_none(platform):
-    assert user_cache_folder(platform, {}, None) is None
-
-
+@needs_posix
 def test_the_variable_of_numba_comes_first(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setattr(config, "CACHE_DIR", "")
     assert kernel_folder() == tmp_path / "xdg" / "entropy_explore_env" / "kernels"
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "numba"))
@@ -48,13 +30,8 @@ def test_the_variable_of_numba_comes_first(tmp_path, monkeypatch):
 
 
 def test_without_a_home_there_is_no_folder(monkeypatch):
-    def nowhere():
-        raise RuntimeError("Could not determine home directory.")
-
     monkeypatch.setattr(config, "CACHE_DIR", "")
-    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(Path, "home", nowhere)
+    monkeypatch.setattr(folder.platformdirs, "user_cache_dir", lambda *_, **__: "~/.cache")
     assert kernel_folder() is None
 
 
@@ -92,3 +69,47 @@ def test_use_is_noted_once_a_day(tmp_path):
         folder.mark_used(path)
     assert today.stat().st_mtime == before
     assert time.time() - earlier.stat().st_mtime < DAY_S
+
+
+@needs_posix
+def test_the_second_waits_for_the_first(tmp_path):
+    kernel, taken = tmp_path / "a.kernel", []
+    first = claim(kernel)
+    thread = threading.Thread(target=lambda: taken.append(claim(kernel)))
+    thread.start()
+    release(claim(tmp_path / "b.kernel"))  # another kernel is free meanwhile
+    time.sleep(0.1)
+    assert not taken
+    release(first)
+    thread.join(timeout=30)
+    assert len(taken) == 1
+    release(taken[0])
+    assert not list(tmp_path.iterdir())
+
+
+@needs_posix
+def test_a_process_that_dies_lets_go(tmp_path):
+    kernel, pipe = tmp_path / "a.kernel", subprocess.PIPE
+    process = subprocess.Popen([sys.executable, "-c", HOLD, str(kernel)], stdin=pipe, stdout=pipe)
+    assert process.stdout is not None and process.stdout.readline() == b"held\n"
+    process.kill()
+    process.communicate()
+    began_s = time.monotonic()
+    release(claim(kernel))
+    assert time.monotonic() - began_s < 10.0
+
+
+def test_nobody_waits_for_ever_nor_where_there_are_no_locks(tmp_path, monkeypatch):
+    kernel = tmp_path / "a.kernel"
+    first = claim(kernel)
+    monkeypatch.setattr(folder, "_PATIENCE_S", 0.05)
+    release(claim(kernel))
+    monkeypatch.setattr(folder, "_PATIENCE_S", 1e6)
+    monkeypatch.setattr(folder, "fcntl", None)
+    release(claim(kernel))
+    release(first)
+
+
+def test_a_folder_that_cannot_be_written_is_no_matter(tmp_path):
+    (tmp_path / "file").write_text("")
+    release(claim(tmp_path / "file" / "a.kernel"))
