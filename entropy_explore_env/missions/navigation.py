@@ -13,7 +13,7 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.localization import estimate_in
 from entropy_explore_env.missions.poses import to_grid_units, within_grid
 from entropy_explore_env.missions.records import MissionEnd
-from entropy_explore_env.missions.redecision import decide, note_braking, note_change
+from entropy_explore_env.missions.redecision import decide, note_braking
 from entropy_explore_env.missions.rules import ActionSet
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.navigator import plan_path
@@ -61,13 +61,13 @@ def plan_missions(planning, navigator, kind, braking, continuous, discrete, firs
                     choice = planning.choices[mission, index]
                     chosen, number = continuous[mission, index], discrete[mission, index]
                     estimate = estimate_in(planning.estimates, mission, index)
-                    decide(own, planning.actions, robot, estimate, clock.time_s, chosen, number, choice)
-                    note_change(own, robot, choice, braking)
+                    time_s, actions = clock.time_s, planning.actions
+                    decide(own, actions, robot, estimate, time_s, chosen, number, choice, braking)
                     mean, precision = planning.mean[mission, index], planning.precision[mission, index]
                     no_fly = planning.no_fly[mission * own.bodies + own.body_number]
                     if choice.changed:
                         plan_drive(own, navigator, mean, precision, no_fly, choice)
-                        note_braking(own, robot, estimate, clock.time_s, choice, braking)
+                        note_braking(own, robot, estimate, time_s, choice, braking)
                         if choice.brakes:
                             plan_drive(own, navigator, mean, precision, no_fly, choice)
 

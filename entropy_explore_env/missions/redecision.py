@@ -63,12 +63,8 @@ _STANDS_M = 1e-9
 
 
 @lean_kernel
-def decide(params, actions, robot, estimate, time_s, continuous, discrete, choice):
-    """Write what a robot that decides has chosen, as if it began a drive from where it believes to be.
-
-    Args:
-        choice: CHOICE, filled in as for a straight drive.
-    """
+def decide(params, actions, robot, estimate, time_s, continuous, discrete, choice, braking):
+    """Write what a robot has chosen, as if it drove there straight, and whether that changes its drive."""
     copy_numbers(robot.goal, choice.pose, 5)
     if robot.under_way:
         copy_numbers(pose_at(params, robot, time_s), choice.pose, 5)
@@ -77,15 +73,6 @@ def decide(params, actions, robot, estimate, time_s, continuous, discrete, choic
     copy_numbers(choice.pose, choice.start, 3)
     copy_numbers(choice.viewpoint, choice.path[0], 3)
     choice.waypoints, choice.path_end, choice.brakes, choice.changed = 0, 0, False, True
-
-
-@lean_kernel
-def note_change(params, robot, choice, braking):
-    """Find out whether what a robot chose changes its drive.
-
-    Args:
-        choice: CHOICE; `changed` is filled in.
-    """
     if braking is None:  # known while compiling: nothing of the rest is compiled
         return
     if robot.under_way and not robot.path_blocked:

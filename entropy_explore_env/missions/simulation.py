@@ -11,12 +11,12 @@ import numpy as np
 from entropy_explore_env.compilation.announcement import end_of_step
 from entropy_explore_env.errors import ActionError, CallOrderError, SettingError
 from entropy_explore_env.missions.compiled_step import Arrays, CompiledStep
+from entropy_explore_env.missions.endings import Returning
 from entropy_explore_env.missions.episode import FixedWorlds, Start, draw_start, fill_start
 from entropy_explore_env.missions.memory import Batch, check_memory
 from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.reset_options import DRAWN, ResetOptions
-from entropy_explore_env.missions.returning import Returning
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.state import FROM_WORLD, MissionState, new_state
 from entropy_explore_env.missions.state_ranges import check_ranges

@@ -36,7 +36,7 @@ from entropy_explore_env.missions.messages import Maps, Team, Tracer, announce, 
 from entropy_explore_env.missions.own_maps import summaries_of
 from entropy_explore_env.missions.phases import broadcast_all
 from entropy_explore_env.missions.records import MissionEnd
-from entropy_explore_env.missions.redecision import decide, note_braking, note_change
+from entropy_explore_env.missions.redecision import decide, note_braking
 from entropy_explore_env.missions.reward import reward_robots
 from entropy_explore_env.missions.scanning import scan_and_share
 from entropy_explore_env.missions.scoring import note_progress
@@ -129,9 +129,9 @@ def choose(team, clock, actions, continuous, discrete, choices, braking):
         robot.received_bits = 0.0
         if robot.deciding and not own.planned:
             choice, estimate = choices[index], estimate_of(team.localization, index)
-            decide(own, actions, robot, estimate, clock.time_s, continuous[index], discrete[index], choice)
-            note_change(own, robot, choice, braking)
-            note_braking(own, robot, estimate, clock.time_s, choice, braking)
+            chosen, number, time_s = continuous[index], discrete[index], clock.time_s
+            decide(own, actions, robot, estimate, time_s, chosen, number, choice, braking)
+            note_braking(own, robot, estimate, time_s, choice, braking)
 
 
 @lean_kernel

@@ -48,3 +48,15 @@ def test_only_missions_that_end_by_what_was_seen_may_ask_for_it():
     for settings in ({}, {"seen_share": 1.0, "termination": "shared"}):
         with pytest.raises(SettingError, match=r"Ending.return_to_start = True: .*seen"):
             Ending(return_to_start=True, **settings)
+
+
+def test_a_team_that_drives_home_is_not_exhausted():
+    ending = {"seen_share": 1.0, "return_to_start": True}
+    env = EntropyExploreEnv(with_settings(find_scenario("bhattacharya-office"), {"ending": ending}))
+    env.reset(seed=0)
+    missions, clock = env.missions, env.missions.state.missions[0]
+    for seen, end in ((clock["visible"], MissionEnd.RUNNING), (0, MissionEnd.EXHAUSTED)):
+        clock["explored_visible"], clock["end"] = seen, MissionEnd.EXHAUSTED.code
+        missions.state.robots[0]["goal"][:, 0] += 5.0
+        missions._returning.end(missions.rules, missions.state)
+        assert missions.over(0) is end
