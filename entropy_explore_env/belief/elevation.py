@@ -76,14 +76,9 @@ def elevation_map(
 
 @lean_kernel
 def _fill_ground(mean, precision, prior, unit, ground):
-    """Height and deviation in voxel edges, and number of measurements, of the ground of each column.
+    """Fill (3, X, Y): height and deviation in voxel edges, and number of measurements, of columns' ground.
 
-    Args:
-        mean: (X, Y, Z) float32.
-        precision: (X, Y, Z) float32.
-        prior: Precision of a voxel that was never measured, float32.
-        unit: Precision of one measurement.
-        ground: (3, X, Y) float64, filled.
+    `prior` is the precision of a voxel that was never measured, `unit` that of one measurement.
     """
     for i in range(mean.shape[0]):
         for j in range(mean.shape[1]):

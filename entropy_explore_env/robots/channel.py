@@ -93,14 +93,7 @@ def edges_in_walls(air, size, start, finish):
 
 @lean_kernel
 def path_loss_db(apart_m, exponent, wall_loss_db_per_m, walls_m):
-    """Return what the way beyond the first metre costs: see `settings.channel.Signal`.
-
-    Args:
-        apart_m: Distance between sender and teammate.
-        exponent: Of the loss in the open.
-        wall_loss_db_per_m: Of solid voxels.
-        walls_m: Metres of the way that are in them.
-    """
+    """Return what the way beyond the first metre costs: see `settings.channel.Signal`."""
     return 10.0 * exponent * math.log10(max(apart_m, _NEAREST_M)) + wall_loss_db_per_m * walls_m
 
 
@@ -160,11 +153,7 @@ def steered_i_min(i_min_bits, utility, burst, fill):
 def draw_delivery(apart_m, range_m, loss_probability, rng):
     """Return whether a message reaches a teammate: the code of a Delivery.
 
-    Args:
-        apart_m: Distance between the two when it is sent.
-        range_m: Reach of the channel.
-        loss_probability: Of losing it.
-        rng: (1,) uint64 random state of the sender; drawn from only if a loss is possible.
+    `rng` is of the sender, and drawn from only if a loss is possible.
     """
     lost = loss_probability > 0.0 and draw_uniform(rng) < loss_probability
     if apart_m > range_m:

@@ -141,11 +141,7 @@ def correct_by_landmark(estimate, landmark, seen, sigmas, matrices):
 def foresee_landmark(covariance, landmark, here, away, sigmas, matrices):
     """Take in what sighting a landmark of the robot's own map again should say, where it is as believed.
 
-    Args:
-        landmark: LANDMARK, which stays as it is.
-        here: (x, y, z), where the robot believes to be.
-        away: (x, y, z), from there to where it believes the landmark to be.
-        sigmas: As of `correct_by_landmark`.
+    `away` (x, y, z) leads from `here`, where the robot believes to be, to where it believes the landmark is.
     """
     if added_since(landmark, here, covariance, matrices):
         take_landmark(covariance, landmark, away, away, sigmas, matrices)
@@ -153,16 +149,10 @@ def foresee_landmark(covariance, landmark, here, away, sigmas, matrices):
 
 @lean_kernel
 def take_landmark(covariance, landmark, seen, expected, sigmas, matrices):
-    """Take in what a sighting says of what was added since its landmark was chosen.
+    """Return (x, y, z, yaw) that a sighting takes from an estimate, and take it in where its landmark is.
 
-    Args:
-        seen: (x, y, z), as of `correct_by_landmark`.
-        expected: (x, y, z), from where the robot believes to be to where it believes the landmark to be.
-        sigmas: As of `correct_by_landmark`.
-        matrices: (2, 4, 4) float64, as `added_since` has filled them; the first is changed.
-
-    Returns:
-        (x, y, z, yaw) that is to be taken from the estimate.
+    It tells of what was added since the landmark was chosen: `added_since` has filled `matrices`, of which
+    the first is changed. Other arguments as of `correct_by_landmark`.
     """
     added, believed, first = matrices[0], landmark.believed, landmark.seen_from
     far_m = length((believed[0] - first[0], believed[1] - first[1], believed[2] - first[2]))
@@ -182,18 +172,7 @@ def take_landmark(covariance, landmark, seen, expected, sigmas, matrices):
 
 @inlined_kernel
 def take_relative(covariance, added, axis, expected, off, variance, taken):
-    """Take in what a sighting says along one axis of what was added: as `correct_along`, from Q.
-
-    Args:
-        added: (4, 4) float64, Q; likewise.
-        expected: (x, y, z), from where the robot believes to be to where it believes the landmark to be.
-        off: What was seen less what was expected.
-        variance: Along the axis.
-        taken: (x, y, z, yaw), what the axes before have taken from the estimate.
-
-    Returns:
-        The same, with what this axis takes.
-    """
+    """Take in what a sighting says along one axis of what was added, Q: as `correct_along`."""
     gains, spread, taken = gain_along(added, axis, expected, off, variance, taken)
     lessen(covariance, gains, spread)
     keep_positive(covariance)

@@ -164,13 +164,7 @@ def add_drift(error, covariance, number, variance, rng):
 
 @lean_kernel
 def sighting_error(relative, range_sigma_m, bearing_sigma_rad, rng):
-    """Return (x, y, z), a drawn error of a sighting: along the sight; sideways and up with the distance.
-
-    Args:
-        relative: (x, y, z), from the robot to the landmark.
-        range_sigma_m: Standard deviation along it.
-        bearing_sigma_rad: Of its direction.
-    """
+    """Return (x, y, z), a drawn error of a sighting: along the sight; sideways and up with the distance."""
     ahead, side, up, distance = sight_axes(relative)
     along = range_sigma_m * draw_gaussian(rng)
     aside = distance * bearing_sigma_rad * draw_gaussian(rng)

@@ -209,9 +209,6 @@ def open_summary(tree, length, size):
     """Begin to read the summary in the first bytes of a Tree's data; returns whether its form is known.
 
     Its checksum is not looked at: a message of a mission arrives whole, or not at all.
-
-    Args:
-        length: Bytes of the summary, at least 6.
     """
     data = tree.coder.data
     if data[0] != _MAGIC or (data[1] != _LEARNED and data[1] != _FLAT):
@@ -223,12 +220,7 @@ def open_summary(tree, length, size):
 
 @lean_kernel
 def checksum(data, length, size):
-    """CRC-32 of a grid's shape, three numbers of 32 bits with the least byte first, its form and its tree.
-
-    Args:
-        data: (M,) uint8, a summary in its first bytes.
-        length: How many it has.
-    """
+    """Return the CRC-32 of a grid's shape, in numbers of 32 bits, and of form and tree of a summary."""
     crc = 0xFFFFFFFF
     for axis in range(3):
         for place in range(4):

@@ -95,12 +95,7 @@ class Region(NamedTuple):
 
 
 def new_tree(data: np.ndarray, levels: int) -> Tree:
-    """Working space for a tree that is written into, or read from, data (M,) uint8.
-
-    Args:
-        data: The bytes.
-        levels: V, voxels of the map; 0 = only for reading.
-    """
+    """Working space for a tree in data (M,) uint8, of a map of that many levels; 0 = only for reading."""
     return Tree(
         coder=Coder(np.zeros(1, CODER), np.zeros(_CONTEXTS, np.uint32), data),
         walk=np.zeros(1, WALK),
@@ -180,12 +175,9 @@ def size_context(walk, voxels):
 
 @lean_kernel
 def write_tree(tree, mean, precision, threshold_bits):
-    """Cut a map into leaves, and write the tree.
+    """Cut a map into leaves of at most `threshold_bits`, and write the tree; precisions may be 0 here.
 
-    Args:
-        tree: Tree, its walk begun, its coder writing.
-        precision: (V,) float32, 1/σ² ≥ 0, of what is to be sent; looked at in the walk's box only.
-        threshold_bits: Most information content of a leaf.
+    Only what is in the walk's box is looked at.
     """
     fill_levels(tree.walk[0], mean, precision, tree.levels)
     while next_leaf(tree, threshold_bits):
@@ -313,12 +305,6 @@ def information_bits(tree, region, voxels):
             bits -= share * math.log2(share)
             counts[level] = 0
     return bits
-
-
-@inlined_kernel
-def sigma_code(variance):
-    """Return the least code whose σ is not below that of a variance."""
-    return max(math.ceil(0.5 * _STEPS * math.log2(variance / (_FINEST * _FINEST))), 0)
 
 
 @lean_kernel

@@ -44,12 +44,7 @@ def spread_yaw_error(covariance, to_x, to_y):
 
 @inlined_kernel
 def drift_variances(params, metres, turned):
-    """Return (of x and of y, of z, of the yaw): the variances that a piece of a drive adds.
-
-    Args:
-        metres: Driven, ≥ 0.
-        turned: Radians, ≥ 0.
-    """
+    """Return (of x and of y, of z, of the yaw): the variances that metres driven and radians turned add."""
     return (
         params.xy_per_m * metres,
         params.z_per_m * metres,
@@ -65,13 +60,7 @@ def turn_between(yaw, other):
 
 @lean_kernel
 def in_field_of_view(params, yaw, pitch, away):
-    """Return whether a landmark is in the field of view of a gaze.
-
-    Args:
-        yaw: Of the gaze.
-        pitch: Downwards.
-        away: (x, y, z), from the robot to the landmark.
-    """
+    """Return whether a landmark, (x, y, z) from the robot, is in the field of view of a gaze."""
     x, y, z = away
     turn = math.atan2(y, x) - yaw
     down = math.atan2(-z, math.sqrt(x * x + y * y))
@@ -83,12 +72,7 @@ def in_field_of_view(params, yaw, pitch, away):
 
 @lean_kernel
 def within_half_view(params, turn, tilt):
-    """Return whether a direction this many radians beside and below the gaze is in the field of view.
-
-    Args:
-        turn: In radians, of any number of turns; so is `tilt`.
-        tilt: Downwards.
-    """
+    """Return whether a direction this many radians beside and below the gaze is in the field of view."""
     aside, down = abs(within_half_turn(turn)), abs(within_half_turn(tilt))
     return aside <= params.half_yaw_rad and down <= params.half_pitch_rad
 
@@ -119,17 +103,7 @@ def sight_axes(relative):
 
 @inlined_kernel
 def correct_along(covariance, axis, expected, off, variance, taken):
-    """Correct a pose by what a sighting says along one axis, as a Kalman filter does.
-
-    Args:
-        expected: As of `correct_by_sighting`.
-        off: What was seen less what was expected.
-        variance: Of what was seen, along the axis.
-        taken: (x, y, z, yaw), what the axes before have taken from the estimate.
-
-    Returns:
-        The same, with what this axis takes.
-    """
+    """Correct a pose by what a sighting says along one axis; returns `taken`: see `gain_along`."""
     gains, spread, taken = gain_along(covariance, axis, expected, off, variance, taken)
     lessen(covariance, gains, spread)
     keep_positive(covariance)

@@ -8,7 +8,6 @@ from hypothesis import given
 
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
-from entropy_explore_env.belief.paths.planning import shortest_path
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.planner.candidate_features import COLUMNS
@@ -27,6 +26,7 @@ from entropy_explore_env.settings.scenarios import BOX
 from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.viewpoints.evaluation import line_is_free, new_scratch, robot_model
 from entropy_explore_env.viewpoints.expected_scan import expected_bits
+from tests.belief.paths.graphs import shortest_path
 from tests.reference.scenes import drawn, free_box, put, random_belief, seeds, started
 
 SIZE, MOST = (7, 11, 5), 6

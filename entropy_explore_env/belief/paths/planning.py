@@ -26,8 +26,6 @@ from entropy_explore_env.belief.paths.lattice import (
     FREE,
     IMPASSABLE,
     UNKNOWN,
-    Costs,
-    Lattice,
     classify_voxel,
     in_no_fly,
 )
@@ -39,18 +37,14 @@ from entropy_explore_env.belief.paths.search import (
     STEP,
     STEP_SHIFT,
     TIGHT,
-    Search,
     begin_search,
     cost_per_edge,
     cost_to,
-    extract_path,
     mark_of,
 )
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.errors import SettingError
-from entropy_explore_env.settings.validation import is_whole
 
 ANY_GOAL = -1
 """As a goal: paths to all voxels are wanted."""
@@ -241,7 +235,7 @@ def search_paths(search, lattice, costs, sources, goal, max_cost):
     cost.
 
     Args:
-        search: Filled in; read it by `cost_to`, `extract_path` and `costs_to_all`.
+        search: Filled in; read it by `cost_to` and `extract_path`.
         sources: (S,) int32, voxels.
         goal: A voxel; ANY_GOAL = all.
         max_cost: Paths that cost more are not found; inf allowed.
@@ -279,50 +273,3 @@ def resume_search(search, lattice, costs, max_cost):
     query = _Query(ANY_GOAL, (0, 0, 0), BUCKET_WIDTH**-1 / costs.min_per_edge)
     while advance(search.queue) and search.queue.state[0].current <= max_cost * query.per_cost:
         _expand_block(search, lattice, costs, query, math.inf)
-
-
-def shortest_path(
-    search: Search, lattice: Lattice, costs: Costs, start: int, goal: int, max_cost: float = math.inf
-) -> tuple[float, np.ndarray]:
-    """Return the cheapest path from a voxel to another.
-
-    Args:
-        search: Memory of the search.
-        lattice: The steps.
-        costs: Traversal costs.
-        start: Number of a voxel; may be impassable.
-        goal: Likewise; reached only if it is passable, or the start.
-        max_cost: Paths that cost more are not found.
-
-    Returns:
-        Its cost, and (N,) int32 the voxels from start to goal; (inf, none) if there is no path.
-
-    Raises:
-        SettingError: Start or goal is no voxel of the lattice, or `max_cost` is no number ≥ 0.
-    """
-    _check_voxel(lattice, "start", start)
-    _check_voxel(lattice, "goal", goal)
-    _check_fit(search, lattice, costs, max_cost)
-    cost = search_paths(search, lattice, costs, np.array([start], np.int32), int(goal), float(max_cost))
-    path = np.empty(extract_path(search, lattice, int(goal), np.empty(0, np.int32)), np.int32)
-    extract_path(search, lattice, int(goal), path)
-    return float(cost), path
-
-
-def _check_voxel(lattice: Lattice, field: str, voxel: int) -> None:
-    voxels = math.prod(lattice.size)
-    if not is_whole(voxel, 0, voxels - 1):
-        raise SettingError(field, voxel, f"the number of a voxel, from 0 to {voxels - 1}")
-    if lattice.layer >= 0 and voxel % lattice.size[2] != lattice.layer:
-        raise SettingError(field, voxel, f"a voxel of layer {lattice.layer}")
-
-
-def _check_fit(search: Search, lattice: Lattice, costs: Costs, max_cost: float) -> None:
-    voxels = math.prod(lattice.size)
-    if len(search.mark) != voxels:
-        raise SettingError("search", len(search.mark), f"memory for {voxels} voxels")
-    field = len(costs.per_edge) or len(costs.mean)
-    if field != voxels or (len(costs.per_edge) == 0 and len(costs.precision) != voxels):
-        raise SettingError("costs", field, f"a field of {voxels} voxels")
-    if not max_cost >= 0.0:
-        raise SettingError("max_cost", max_cost, "a number ≥ 0, or inf")

@@ -141,10 +141,3 @@ def extract_path(search, lattice, voxel, path):
             path[index] = at
             at = _predecessor(search, lattice, at)
     return count
-
-
-@lean_kernel
-def costs_to_all(search, costs):
-    """Fill (V,) float64 with the costs of reaching all voxels in the latest search; inf = not reached."""
-    for voxel in range(len(costs)):
-        costs[voxel] = cost_to(search, voxel)

@@ -9,12 +9,9 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
-from entropy_explore_env.belief.paths.planning import (
-    ANY_GOAL,
-    search_paths,
-    shortest_path,
-)
-from entropy_explore_env.belief.paths.search import costs_to_all, new_search
+from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
+from entropy_explore_env.belief.paths.search import cost_to, extract_path, new_search
+from entropy_explore_env.compilation.kernels import lean_kernel
 from tests.reference.scenes import flat_index
 
 PRIOR = 1.0 / 900.0
@@ -54,6 +51,21 @@ def random_rates(shape, seed, decades, walls=0.25):
 def known(covered):
     """Mean and precision of a belief that is sure of everything."""
     return covered.astype(np.float32), np.full(covered.shape, KNOWN, np.float32)
+
+
+@lean_kernel
+def costs_to_all(search, costs):
+    """Fill (V,) with the costs of reaching all voxels in the latest search; inf = not reached."""
+    for voxel in range(len(costs)):
+        costs[voxel] = cost_to(search, voxel)
+
+
+def shortest_path(search, lattice, costs, start, goal, max_cost=math.inf):
+    """Cost and voxels (N,) of the cheapest path from a voxel to another; (inf, none) if there is none."""
+    cost = search_paths(search, lattice, costs, np.array([start], np.int32), int(goal), float(max_cost))
+    path = np.empty(extract_path(search, lattice, int(goal), np.empty(0, np.int32)), np.int32)
+    extract_path(search, lattice, int(goal), path)
+    return float(cost), path
 
 
 def all_costs(search, lattice, costs, sources, max_cost=math.inf):

@@ -16,14 +16,24 @@ from entropy_explore_env.belief.paths.planning import (
     ANY_GOAL,
     resume_search,
     search_paths,
-    shortest_path,
     start_search,
 )
-from entropy_explore_env.belief.paths.search import costs_to_all, new_search
+from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World
-from tests.belief.paths.graphs import KNOWN, PRIOR, UNKNOWN, all_costs, graph_of, known, plan, random_rates
+from tests.belief.paths.graphs import (
+    KNOWN,
+    PRIOR,
+    UNKNOWN,
+    all_costs,
+    costs_to_all,
+    graph_of,
+    known,
+    plan,
+    random_rates,
+    shortest_path,
+)
 from tests.reference.scenes import SHAPES, drawn, flat_index, random_cover, seeds
 
 SIZE = (7, 11, 5)
@@ -302,25 +312,4 @@ def test_given_costs_hold_for_bodies_of_any_size(radius):
 def test_what_is_refused(ask, field):
     with pytest.raises(SettingError) as raised:
         ask()
-    assert raised.value.field == field
-
-
-@pytest.mark.parametrize(
-    ("change", "field"),
-    [
-        ({"start": -1}, "start"),
-        ({"goal": 385}, "goal"),
-        ({"goal": 2.0}, "goal"),
-        ({"start": 1}, "start"),
-        ({"max_cost": -1.0}, "max_cost"),
-        ({"max_cost": math.nan}, "max_cost"),
-        ({"search": new_search(384)}, "search"),
-        ({"costs": field_costs(np.ones(386, np.float32))}, "costs"),
-    ],
-)
-def test_what_a_path_search_refuses(change, field):
-    costs = belief_costs(*known(np.zeros(SIZE, bool)), PRIOR)
-    asked = {"search": new_search(385), "lattice": new_lattice(SIZE, 0.0, 2), "costs": costs}
-    with pytest.raises(SettingError) as raised:
-        shortest_path(**{**asked, "start": 2, "goal": 7, **change})
     assert raised.value.field == field
