@@ -13,7 +13,7 @@ import pytest
 from baselines.cli import arguments as checkout
 from entropy_explore_env import command
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED, LineParser, UsageError
-from entropy_explore_env.errors import CallOrderError, SettingError, WorldError, counted
+from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
 from entropy_explore_env.starting import is_command
 from tests.systems import needs_posix
 
@@ -89,22 +89,9 @@ def test_a_terminal_that_lacks_characters_gets_question_marks(run, monkeypatch):
         assert stream.buffer.getvalue() == expected
 
 
-COMMANDS = (
-    "baselines.run",
-    pytest.param("entropy_explore_env", marks=pytest.mark.long),
-    pytest.param("baselines.benchmark", marks=pytest.mark.long),
-    pytest.param("baselines.replay", marks=pytest.mark.long),
-    pytest.param("baselines.papers", marks=pytest.mark.long),
-    pytest.param("training.ppo", marks=pytest.mark.long),
-    pytest.param("training.evaluate", marks=pytest.mark.long),
-    pytest.param("benchmarks.speed", marks=pytest.mark.long),
-)
-
-
-@pytest.mark.parametrize("name", COMMANDS)
-def test_the_help_of_a_command_comes_out_on_a_terminal_of_ascii(name):
+def test_the_help_of_a_command_comes_out_on_a_terminal_of_ascii():
     variables = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "PYTHONIOENCODING": "ascii"}
-    words = [sys.executable, "-m", name, "--help"]
+    words = [sys.executable, "-m", "baselines.run", "--help"]
     done = subprocess.run(words, env=variables, capture_output=True, timeout=120)
     assert done.returncode == 0, done.stderr.decode()
     assert b"--help" in done.stdout and b"Traceback" not in done.stderr
@@ -163,7 +150,3 @@ def test_whole_numbers_have_exponents_and_paths_begin_at_home(monkeypatch, tmp_p
     for words in (["--number", "1.5", "a"], ["~nobody-of-this-name/a"]):
         with pytest.raises(UsageError):
             parser.parse_args(words)
-
-
-def test_one_is_counted_as_one():
-    assert [counted(n, "robot") for n in (0, 1, 2)] == ["0 robots", "1 robot", "2 robots"]

@@ -82,38 +82,6 @@ def test_commands_of_a_page_can_be_typed(page):
     assert {shlex.join(words): found for words in commands if (found := faults(words))} == {}
 
 
-def test_commands_are_found_wherever_they_stand():
-    page = """
-Run `python -m a.b --c
-d`, not `name`.
-
-    make docs  # all
-
-```
-FAST=1 python -m c \\
-  --d e
-```
-"""
-    assert sorted(map(shlex.join, told_in(page))) == ["make docs", "python -m a.b --c d", "python -m c --d e"]
-    assert sum(len(told_in(page.read_text("utf-8"))) for page in PAGES) > 100
-
-
-@pytest.mark.parametrize(
-    ("command", "missing"),
-    [
-        ("python -m baselines.run room --robots 2 --channel.burst 32", []),
-        ("python -m baselines.run room --robot 2 --channel.bursts=32", ["--channel.bursts", "--robot"]),
-        ("python -m baselines.runs room", ["baselines.runs"]),
-        ("python -m entropy_explore_env worlds show office --seed 1 --wings", ["--wings"]),
-        ("entropy-explore-env world list", ["world"]),
-        ("python -m pip install -e . --no-deps", []),
-        ("make demos", ["demos"]),
-    ],
-)
-def test_what_is_not_there_is_named(command, missing):
-    assert faults(shlex.split(command)) == missing
-
-
 def test_workflows_make_what_the_makefile_has():
     texts = [path.read_text("utf-8") for path in (ROOT / ".github").rglob("*.yml")]
     made = {

@@ -67,36 +67,18 @@ def test_until_all_is_on_the_disk_the_file_is_the_older_one(tmp_path, monkeypatc
     assert seen == [("older", "newer", True)]
 
 
-def fail_in_fsync(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
-    def fsync(handle: int) -> None:
-        raise error
-
-    monkeypatch.setattr(os, "fsync", fsync)
-
-
-def fail_in_replace(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
-    def replace(self: Path, target: Path) -> None:
-        raise error
-
-    monkeypatch.setattr(Path, "replace", replace)
-
-
-def fail_in_chmod(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
-    def chmod(self: Path, mode: int) -> None:
-        raise error
-
-    monkeypatch.setattr(Path, "chmod", chmod)
-
-
 @pytest.mark.parametrize("older", [None, "older"])
 @pytest.mark.parametrize("error", [OSError(28, "No space left on device"), KeyboardInterrupt()])
-@pytest.mark.parametrize("fail", [fail_in_fsync, fail_in_replace, fail_in_chmod])
-def test_a_failure_leaves_what_was_there(fail, error, older, tmp_path, monkeypatch):
+@pytest.mark.parametrize("place", [(os, "fsync"), (Path, "replace"), (Path, "chmod")])
+def test_a_failure_leaves_what_was_there(place, error, older, tmp_path, monkeypatch):
+    def fail(*_: object) -> None:
+        raise error
+
     path = tmp_path / "a.txt"
     if older is not None:
         path.write_text(older)
     with monkeypatch.context() as patch:
-        fail(patch, error)
+        patch.setattr(*place, fail)
         with pytest.raises(type(error)):
             write_atomically(path, "newer")
     assert names(tmp_path) == ([] if older is None else ["a.txt"])

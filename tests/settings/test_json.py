@@ -127,26 +127,6 @@ def test_what_is_wrong_is_named(path, value, named):
         scenario_of(changed(path, value))
 
 
-@pytest.mark.parametrize("settings", [[], 3, None, "inf", "{}"])
-def test_what_is_no_object_is_refused(settings):
-    with pytest.raises(SettingError, match="settings"):
-        scenario_of(settings)
-
-
-@dataclasses.dataclass(frozen=True)
-class Team:
-    """Settings that are a part, or one part a robot."""
-
-    robots: Grid | tuple[Grid, ...]
-    most: float | None = None
-
-
-def test_lists_of_parts_come_back_as_tuples():
-    two = Team((Grid((7, 11, 5), 0.5), Grid((1, 2, 3), 0.1)), math.inf)
-    for team in (two, Team(Grid((7, 11, 5), 0.5))):
-        assert dataclass_of(Team, json.loads(json.dumps(settings_of(team))), "team") == team
-
-
 def test_any_dataclass_of_settings_comes_back():
     kind = RobotKind(Robot(reach_m=math.inf, motion="planar"), RangeSensor(field_of_view_rad=(1.5, 0.25)))
     assert dataclass_of(RobotKind, json.loads(json.dumps(settings_of(kind), allow_nan=False))) == kind

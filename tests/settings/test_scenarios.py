@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 
-import gymnasium
 import numpy as np
 import pettingzoo
 import pytest
@@ -44,17 +43,6 @@ def test_teams_start_and_gather_bits(name):
     for agent in infos:
         place = tuple(scenario.grid.voxel_of(env.view(agent).pose[:3]))
         assert not layout.collision_mask[place], f"{agent} is where its body does not fit"
-
-
-@pytest.mark.parametrize("name", LARGE)
-def test_one_robot_chooses_discrete_actions_under_gymnasium(name):
-    env = gymnasium.make(environment_id(name), action={"kind": "discrete"}, max_cycles=4)
-    _, info = env.reset(seed=2)
-    env.action_space.seed(0)
-    for _ in range(4):
-        *_, truncated, info = env.step(env.action_space.sample(mask=info["action_mask"]))
-    assert truncated
-    env.close()
 
 
 def test_splits_reach_the_environment():

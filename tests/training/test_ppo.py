@@ -6,13 +6,9 @@ import contextlib
 import csv
 import io
 import json
-import os
 import shlex
 import shutil
 import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +20,6 @@ from baselines.experiments.mission import Surroundings
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.settings.scenarios import SCENARIOS
-from tests.systems import needs_posix
 from training import ppo
 from training.advantages import DecisionBuffer
 from training.checkpoints import checkpoint_name, latest_checkpoint, load_checkpoint
@@ -142,20 +137,6 @@ def test_a_resumed_run_ends_bitwise_like_an_uninterrupted_one(uninterrupted, tmp
     assert load_checkpoint(latest_checkpoint(out, "best")).weights.keys()
 
 
-@needs_posix
-def test_a_run_killed_by_a_signal_can_be_resumed(tmp_path, uninterrupted):
-    """At an arbitrary moment after its first checkpoint."""
-    out = tmp_path / "run"
-    words = [sys.executable, "-m", "training.ppo", *TINY, "--out", str(out), "--total-steps", "384"]
-    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        deadline = time.monotonic() + 120
-        while not list(out.glob("step-*")) and process.poll() is None and time.monotonic() < deadline:
-            time.sleep(0.005)
-        process.send_signal(signal.SIGKILL)
-    assert resume(out) == 0
-    assert checkpoint_bits(out) == checkpoint_bits(uninterrupted[0])
-
-
 @pytest.mark.parametrize("during", ["rollout", "validation", "last validation"])
 def test_ctrl_c_writes_a_checkpoint_and_says_how_to_go_on(
     during, uninterrupted, tmp_path, capsys, monkeypatch
@@ -264,12 +245,6 @@ def test_bad_settings_are_one_line(tmp_path, capsys, words, named):
     assert not (tmp_path / "run").exists()
 
 
-def test_a_folder_that_cannot_be_made_is_one_line(tmp_path, capsys):
-    (tmp_path / "file").write_text("")
-    assert learn(tmp_path / "file" / "run") == BAD_INPUT
-    assert len(capsys.readouterr().err.splitlines()) == 1
-
-
 @pytest.mark.parametrize("what", ["reward", "weights"])
 def test_what_is_not_finite_stops_the_run_and_leaves_the_last_good_checkpoint(
     tmp_path, capsys, monkeypatch, what
@@ -300,25 +275,6 @@ def test_what_is_not_finite_stops_the_run_and_leaves_the_last_good_checkpoint(
     assert what != "reward" or "reward = nan after 246 steps" in said[0]
     kept = load_checkpoint(latest_checkpoint(out, "step"), training=True)
     assert all(torch.isfinite(each).all() for each in kept.weights.values())
-
-
-def test_a_disk_that_is_full_leaves_the_last_good_checkpoint(tmp_path, capsys, monkeypatch):
-    out, fsync, calls = tmp_path / "run", os.fsync, []
-
-    def full(handle):
-        calls.append(1)
-        if list(out.glob("step-*")):
-            raise OSError(28, "No space left on device")
-        fsync(handle)
-
-    monkeypatch.setattr(os, "fsync", full)
-    assert learn(out) == BAD_INPUT
-    said = capsys.readouterr().err.splitlines()
-    assert len(said) == 1 and "No space left" in said[0]
-    monkeypatch.undo()
-    load_checkpoint(latest_checkpoint(out, "step"), training=True)
-    assert not list(out.glob(".*.unfinished"))
-    assert resume(out) == 0
 
 
 def test_a_best_policy_without_a_checkpoint_counts_as_a_run_and_a_resumed_run_removes_it(tmp_path, capsys):

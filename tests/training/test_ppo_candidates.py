@@ -19,9 +19,7 @@ from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.envs.privileged_vec_env import PrivilegedVecEnv
 from entropy_explore_env.missions.privileged import PRIVILEGED
 from entropy_explore_env.planner.candidate_features import COLUMNS, FEATURES_VERSION
-from tests.training.test_ppo import checkpoint_bits
 from training import checkpoints, ppo
-from training.advantages import DecisionBuffer
 from training.candidate_network import CandidatePolicy
 from training.checkpoints import CheckpointError, latest_checkpoint, load_checkpoint
 from training.policy import make_policy_strategy
@@ -91,29 +89,6 @@ def test_in_the_first_updates_only_the_critic_learns_and_a_run_can_begin_with_we
     assert learn(tmp_path / "on", "--critic-first", "1", "--start", str(trained), steps=128) == 0
     moved = load_checkpoint(latest_checkpoint(tmp_path / "on", "step")).weights
     assert not all(torch.equal(begun[name], moved[name]) for name in begun if ".actor." in name)
-
-
-def test_a_resumed_run_ends_bitwise_like_an_uninterrupted_one(trained, tmp_path, monkeypatch):
-    class Killed(BaseException):
-        """Stands for a kill."""
-
-    compute, rollouts = DecisionBuffer.compute_returns_and_advantage, []
-
-    def die(*args, **kwargs):
-        if len(rollouts) == 2:
-            raise Killed
-        rollouts.append(1)
-        return compute(*args, **kwargs)
-
-    out = tmp_path / "run"
-    with monkeypatch.context() as patch:
-        patch.setattr(DecisionBuffer, "compute_returns_and_advantage", die)
-        with pytest.raises(Killed):
-            learn(out)
-    assert 0 < int(latest_checkpoint(out, "step").name.rpartition("-")[2]) < 192
-    with contextlib.redirect_stdout(io.StringIO()):
-        assert ppo.run_command(ppo.main, ["--resume", str(out)]) == 0
-    assert checkpoint_bits(out) == checkpoint_bits(trained)
 
 
 def test_weights_of_other_networks_are_refused(trained, tmp_path, capsys):
@@ -190,15 +165,3 @@ def test_options_that_would_be_ignored_are_refused(words, name, tmp_path, capsys
     assert ppo.run_command(ppo.main, [*PLAIN, *words.split(), "--out", str(out)]) == BAD_INPUT
     (line,) = capsys.readouterr().err.splitlines()
     assert line.partition(" = ")[0].endswith(name) and "expected no value " in line and not out.exists()
-
-
-def test_options_that_are_read_are_not_refused():
-    for words in ("--hidden 64 64 --yaws 8 --pitches 3 --cost-per-s 0.5", "--actions candidates --width 8"):
-        ppo.check(parsed([*PLAIN, *words.split()]))
-
-
-def test_checkpoints_of_earlier_versions_have_no_candidates(trained):
-    head = json.loads((latest_checkpoint(trained, "best") / "policy.json").read_text())
-    assert {"privileged", "features_version", "candidate_features", "observation"} <= head.keys()
-    pretrained = load_checkpoint(latest_checkpoint(Path("training/pretrained/room"), "best", "step"))
-    assert pretrained.settings.privileged == 0 and pretrained.settings.features_version is None

@@ -124,12 +124,6 @@ def test_ctrl_c_keeps_the_pairs_that_are_done(whole, tmp_path, monkeypatch, caps
     assert (tmp_path / "run" / "weights.json").read_bytes() == (whole / "weights.json").read_bytes()
 
 
-def test_features_that_do_not_vary_keep_their_weights(tmp_path):
-    assert run(tmp_path, "--tasks box-7x11x5:1 --rounds 1") == 0
-    weights = read_weights(tmp_path / "weights.json").weights
-    assert "unknown" in weights and not {"announced_most", "contest"} & set(weights)
-
-
 @pytest.mark.parametrize(
     "line",
     [

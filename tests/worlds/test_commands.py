@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 
@@ -115,22 +112,3 @@ def test_bad_input_is_one_line(floor, tmp_path, monkeypatch, capsys, words):
     said = capsys.readouterr()
     assert said.out == "" and said.err.startswith("error: ") and said.err.count("\n") == 1
     assert sorted(tmp_path.rglob("*")) == before
-
-
-@pytest.mark.parametrize(
-    ("words", "meant"),
-    [
-        (["shw", "office", "--out", "world.png"], "'list', 'show', 'convert'"),
-        (["show", "office", "--out", "world.png", "--split", "tests"], "did you mean test?"),
-    ],
-)
-def test_what_is_nearly_right_is_answered_with_the_right_word(words, meant, capsys):
-    assert run_command(main, words) == 2
-    assert meant in capsys.readouterr().err
-
-
-def test_as_a_process(tmp_path):
-    words = [sys.executable, "-m", "entropy_explore_env", "worlds", "show", "nowhere.obj", "--out", "w.png"]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith("error: world file") and "Traceback" not in done.stderr

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import entropy_explore_env
 from benchmarks.proofs.world_samples import npz, pgm, samples, sketch
 from entropy_explore_env import EntropyExploreEnv, EntropyExploreVectorEnv
 from entropy_explore_env.envs.episodes import require_same, snapshot
@@ -46,11 +45,6 @@ def test_every_kind_of_file_is_a_world(tmp_path, loader):
             loud = path.with_suffix(path.suffix.upper())
             path.rename(loud)
             np.testing.assert_array_equal(load_world(str(loud), **sample.options).occupied, world.occupied)
-
-
-def test_public_names():
-    assert entropy_explore_env.load_world is load_world
-    assert {"load_world", "save_world", "load_octomap"} <= set(entropy_explore_env.__all__)
 
 
 @pytest.mark.parametrize("name", ["castle", "castle.docx", "castle.bt.zip", ""])

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from entropy_explore_env import EntropyExploreVectorEnv, parallel_env
-from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.randomness import Stream, generator
 from entropy_explore_env.settings.scenarios import BOX, ROOM_FURNISHED, find_scenario
-from entropy_explore_env.worlds.load import make_world, with_world, world_from_file, world_with_number
+from entropy_explore_env.worlds.load import make_world, with_world, world_with_number
 from entropy_explore_env.worlds.splits import draw_world_number
 from tests.reference.scenes import free_box
 
@@ -64,17 +64,6 @@ def test_a_world_that_nobody_knows_is_refused(name):
 def test_a_world_number_that_is_none_is_refused(number):
     with pytest.raises(SettingError, match=r"number = .*whole number"):
         world_with_number(ROOM_FURNISHED, number)
-
-
-def test_a_world_file_that_is_missing(tmp_path):
-    path = tmp_path / "nowhere.bt"
-    with pytest.raises(WorldError, match="expected a file that exists") as raised:
-        world_from_file(path, 0.5)
-    assert str(path) in str(raised.value)
-
-
-def test_a_recipe_leaves_the_scenario_s_grid_alone():
-    assert with_world(ROOM_FURNISHED) is ROOM_FURNISHED
 
 
 def test_worlds_by_number_are_those_of_missions():

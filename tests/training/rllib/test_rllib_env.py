@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from entropy_explore_env import ActionError, CallOrderError, SettingError, StepFigures, parallel_env
+from entropy_explore_env import ActionError, CallOrderError, SettingError, parallel_env
 from entropy_explore_env.envs.conformance import leaves, require_same
 
 pytest.importorskip("ray.rllib", reason="ray[rllib] is not installed: make test-rllib", exc_type=ImportError)
@@ -220,12 +220,6 @@ def test_runner_seed_keeps_every_number_apart():
     assert len({runner_seed(*numbers) for numbers in asked}) == len(asked)
 
 
-def test_missions_of_one_runner_differ():
-    runner = runner_of(EntropyExploreMultiAgentEnv, 5, missions=3)
-    runner.sample()
-    assert len({env.unwrapped.team.missions.seeds[0] for env in runner.env.envs or ()}) == 3
-
-
 def test_only_robots_that_decide_may_act():
     env = EntropyExploreMultiAgentEnv(BOX)
     with pytest.raises(CallOrderError, match="before reset"):
@@ -247,40 +241,3 @@ def test_unknown_settings_are_refused():
         EntropyExploreMultiAgentEnv({"scenario": "unknown"})
     with pytest.raises(SettingError, match="seed"):
         EntropyExploreMultiAgentEnv({"seed": -1})
-
-
-EARNED: list[np.ndarray] = []
-
-
-def noted(figures: StepFigures) -> np.ndarray:
-    """A reward of one's own: a figure or two of the step."""
-    EARNED.append(figures.gained_bits - 3.0 * figures.elapsed_s - 50.0 * figures.distance_m)
-    return EARNED[-1]
-
-
-def test_rewards_of_one_s_own_add_up_until_a_robot_decides() -> None:
-    apart: Any = EntropyExploreMultiAgentEnv({**BOX, "decision_period_s": None, "reward_function": noted})
-    observations = apart.reset(seed=0)[0]
-    given = dict.fromkeys(apart.possible_agents, 0.0)
-    choices: int = apart.action_spaces["robot_0"].n  # type: ignore[attr-defined]
-    EARNED.clear()
-    for step in range(12):
-        actions = {agent: np.int64((7 * step + 11) % choices) for agent in observations}
-        observations, rewards, *_ = apart.step(actions)
-        for agent, reward in rewards.items():
-            given[agent] += reward
-        totals = np.sum(EARNED, axis=0)[0]
-        for agent in observations:
-            assert given[agent] == pytest.approx(totals[apart.possible_agents.index(agent)])
-    assert len(EARNED) >= 12 and len(set(given.values())) == 3
-
-
-def test_starts_are_given_in_the_options() -> None:
-    apart = EntropyExploreMultiAgentEnv(BOX)
-    starts = np.array(
-        [[0.75, 0.75, 0.75, 0.5, 0.1], [0.75, 3.75, 0.75, -2.0, -0.1], [2.75, 2.25, 1.25, 0, 0]]
-    )
-    apart.reset(seed=0, options={"starts": starts})
-    np.testing.assert_array_equal(apart.team.missions.state.robots[0]["origin"], starts)
-    with pytest.raises(SettingError, match="did you mean starts"):
-        apart.reset(seed=0, options={"start": starts})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 
 import numpy as np
@@ -103,11 +102,6 @@ def test_a_file_without_faces_is_refused(tmp_path):
     path.write_bytes(b"v 0 0 0\nv 1 0 0\n")
     with pytest.raises(WorldError, match=r"a (whole mesh|mesh with faces)"):
         load_world(path, 0.5)
-
-
-def test_trimesh_reads_from_memory_only(tmp_path):
-    scene = trimesh.load_scene(io.BytesIO(write(tmp_path, "stl").read_bytes()), file_type="stl")
-    assert len(scene.to_mesh().faces) == 24
 
 
 def test_a_surface_in_parts_has_the_same_voxels(monkeypatch):
