@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import torch
@@ -31,9 +31,7 @@ from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
 from baselines.cli.interruption import Interruption
-from baselines.cli.options import Mark
 from baselines.cli.task_options import (
-    TaskOptions,
     absolute_files,
     base_task,
     is_whole_scenario,
@@ -50,7 +48,7 @@ from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.validation import check_whole
 from entropy_explore_env.writing import write_atomically
 from training import extra  # noqa: F401 - before what is not there without it
-from training.advantages import DecisionBuffer, DiscountUnit, Normaliser
+from training.advantages import DecisionBuffer, Normaliser
 from training.candidate_network import (
     ATTENTION_LAYERS,
     WIDTH,
@@ -69,6 +67,7 @@ from training.policy import (
 )
 from training.progress import MissionFigures, Progress, TrainingBar
 from training.runs import (
+    LearningOptions,
     TrainingState,
     check_finite,
     check_options,
@@ -100,7 +99,7 @@ _UPDATES, _LEAST = 8, (8, 16)
 
 
 @dataclass
-class Args:
+class Args(LearningOptions):
     """Train a policy with PPO."""
 
     usual: ClassVar = (
@@ -108,20 +107,12 @@ class Args:
         *("actions", "reward", "threads", "out", "resume", "start", "json"),
     )
 
-    scenario: str = "room"
-    """Named scenario: room, room-furnished, office, … (docs/environments.md lists them)."""
-    robots: int = 3
-    """Robots in a team."""
     missions: int = 64
     """Missions simulated at a time; fewer by default where --total-steps is small."""
     total_steps: int = 2_500_000
     """Steps to train for, counted per robot."""
-    seed: int = 0
-    """Seed of weights, missions and all other draws."""
     out: Path | None = None
     """Folder of a new run; default: runs/SCENARIO-ROBOTS."""
-    resume: Path | None = None
-    """Folder of a run to continue from its latest checkpoint, with the settings that it was started with."""
     threads: int = 2
     """Threads for missions and for updates; choosing actions takes one."""
     json: bool = False
@@ -130,9 +121,6 @@ class Args:
     reward: Literal["individual", "team", "seconds"] = "individual"
     """individual: bits that the robot's own scans take from its map; team: bits that the team's maps lose;
     seconds: less the seconds that the mission takes, and nothing else."""
-    cost_per_s: float | None = None
-    """Cost of a second, as a share of all bits that the mission has to gain; default: the scenario's."""
-    task: Annotated[TaskOptions, Mark.INLINE] = dataclasses.field(default_factory=TaskOptions)
     validation_world: tuple[str, ...] = ()
     """World files of validation, read as those of --world; default: the same as those learned in."""
 
@@ -142,8 +130,6 @@ class Args:
     """Observe the whole belief, pooled to a few cells; with vector features as plain numbers."""
     patch: bool = False
     """Observe the belief around the robot; needs `--features maps`."""
-    hidden: tuple[int, ...] = (128, 128)
-    """Units of the hidden layers of actor and critic."""
     actions: Literal["discrete", "continuous", "candidates"] = "discrete"
     """discrete: 7 moves × yaws × pitches; continuous: any viewpoint within reach; candidates: one of the
     viewpoints that a planner proposes, with networks of their own that begin as the planner."""
@@ -155,29 +141,11 @@ class Args:
     """Layers in which candidates look at each other; 0 = an MLP judges each alone."""
     critic: Literal["observed", "privileged"] = "observed"
     """privileged: in training the critic of `--actions candidates` also reads what no robot may know."""
-    yaws: int = 16
-    """Gazes, and rays of the panorama, around the horizon."""
-    pitches: int = 7
-    """Gazes, and rays of the panorama, from -45° to 45°."""
 
     rollout_steps: int = 128
     """Steps of each mission between two updates; fewer by default where --total-steps is small."""
-    epochs: int = 4
-    """Passes over a rollout's decisions in an update."""
     batch: int = 1024
     """Decisions in a minibatch."""
-    learning_rate: float = 1e-3
-    """Adam's learning rate at first; it falls linearly to a twentieth."""
-    discount: DiscountUnit = "seconds"
-    """What the discount is counted in: seconds or decisions."""
-    gamma: float = 0.9
-    """Discount factor per second, or per decision."""
-    gae_lambda: float = 0.95
-    """λ of generalised advantage estimation, per decision."""
-    clip: float = 0.2
-    """Clipping range of PPO's probability ratio."""
-    entropy: float = 0.003
-    """Weight of the entropy bonus."""
     target_kl: float | None = None
     """An update ends when the policy has moved about this far, in nats; default: after all of its epochs."""
     critic_first: int = 0
@@ -187,8 +155,6 @@ class Args:
 
     validate_every: int = 250_000
     """Steps between two validations."""
-    validation_missions: int = 32
-    """Missions in a validation."""
     video: bool = True
     """At the end, run a mission of the best policy and write it as a picture and an animation."""
     checkpoint_every: int = 500_000

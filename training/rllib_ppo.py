@@ -20,15 +20,13 @@ import shutil
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from baselines.cli.arguments import make_folder, parse, run_command
 from baselines.cli.interruption import Interruption
-from baselines.cli.options import Mark
 from baselines.cli.task_options import (
-    TaskOptions,
     base_task,
     is_whole_scenario,
     parsed_for,
@@ -39,7 +37,6 @@ from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.validation import check_whole
 from training import extra  # noqa: F401 - before what is not there without it
-from training.advantages import DiscountUnit
 from training.checkpoints import NotFiniteError, SilentRunnersError
 from training.ppo import OWN
 from training.rllib_run import (
@@ -54,6 +51,7 @@ from training.rllib_run import (
 )
 from training.runs import (
     FILE,
+    LearningOptions,
     check_new,
     check_options,
     resume_command,
@@ -75,7 +73,7 @@ LOSSES = ("total_loss", "policy_loss", "vf_loss", "entropy")
 
 
 @dataclass
-class Args:
+class Args(LearningOptions):
     """Train a policy with RLlib's PPO."""
 
     usual: ClassVar = (
@@ -83,59 +81,26 @@ class Args:
         *("time_limit_s", "features", "batch", "address", "out", "resume"),
     )
 
-    scenario: str = "room"
-    """Named scenario: room, room-furnished, office, … (docs/environments.md lists them)."""
-    robots: int = 3
-    """Robots in a team."""
     total_steps: int = 1_000_000
     """Robots' decisions to train for."""
-    seed: int = 0
-    """Seed of weights, missions and all other draws."""
     out: Path | None = None
     """Folder of a new run; default: runs/rllib-SCENARIO-ROBOTS."""
-    resume: Path | None = None
-    """Folder of a run to continue from its latest checkpoint, with the settings that it was started with."""
     address: str | None = None
     """HOST:PORT of a Ray cluster, or auto for that of this machine; by default this machine alone."""
     runners: int = 2
     """Processes that collect experience; 0: the trainer itself does."""
     missions: int = 32
     """Missions in each runner."""
-    task: Annotated[TaskOptions, Mark.INLINE] = field(default_factory=TaskOptions)
-    cost_per_s: float | None = None
-    """Cost of a second, as a share of all bits that the mission has to gain; default: the scenario's."""
 
     features: Literal["gazes", "vector"] = "gazes"
     """vector: an MLP; gazes: also a small network for gazes, over the panorama."""
-    hidden: list[int] = field(default_factory=lambda: [128, 128])
-    """Units of the hidden layers of actor and critic."""
-    yaws: int = 16
-    """Gazes, and rays of the panorama, around the horizon."""
-    pitches: int = 7
-    """Gazes, and rays of the panorama, from -45° to 45°."""
-    learning_rate: float = 1e-3
-    """Adam's learning rate at first; it falls linearly to a twentieth."""
-    discount: DiscountUnit = "seconds"
-    """What the discount is counted in: seconds or decisions."""
-    gamma: float = 0.9
-    """Discount factor per second, or per decision."""
-    gae_lambda: float = 0.95
-    """λ of generalised advantage estimation, per decision."""
-    clip: float = 0.2
-    """Clipping range of PPO's probability ratio."""
-    entropy: float = 0.003
-    """Weight of the entropy bonus."""
     batch: int = 8192
     """Decisions in an iteration."""
     minibatch: int = 1024
     """Decisions in a minibatch."""
-    epochs: int = 4
-    """Passes over an iteration's decisions."""
 
     validate_every: int = 100_000
     """Decisions between two validations; there is one at the end."""
-    validation_missions: int = 32
-    """Missions in a validation."""
     checkpoint_every: int = 10
     """Iterations between two checkpoints; there is one after the first, and one at the end or at Ctrl-C."""
 

@@ -10,19 +10,21 @@ import shlex
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Annotated, Any, Protocol, TypeVar
 
 import numpy as np
 import torch
 from stable_baselines3 import PPO
 
 from baselines.cli.arguments import parse
+from baselines.cli.options import Mark
+from baselines.cli.task_options import TaskOptions
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.json import dataclass_of, settings_of
 from entropy_explore_env.settings.validation import check_whole, is_whole
 from entropy_explore_env.writing import write_atomically
-from training.advantages import DecisionBuffer, Normaliser
+from training.advantages import DecisionBuffer, DiscountUnit, Normaliser
 from training.checkpoints import (
     Checkpoint,
     CheckpointError,
@@ -36,12 +38,52 @@ from training.checkpoints import (
 from training.policy import POLICIES, check_same_networks, load_weights, weights_of
 from training.progress import Progress
 
+
+@dataclass
+class LearningOptions:
+    """Options of every trainer of policies."""
+
+    scenario: str = "room"
+    """Named scenario: room, room-furnished, office, … (docs/environments.md lists them)."""
+    robots: int = 3
+    """Robots in a team."""
+    seed: int = 0
+    """Seed of weights, missions and all other draws."""
+    resume: Path | None = None
+    """Folder of a run to continue from its latest checkpoint, with the settings that it was started with."""
+    task: Annotated[TaskOptions, Mark.INLINE] = field(default_factory=TaskOptions)
+    cost_per_s: float | None = None
+    """Cost of a second, as a share of all bits that the mission has to gain; default: the scenario's."""
+    hidden: tuple[int, ...] = (128, 128)
+    """Units of the hidden layers of actor and critic."""
+    yaws: int = 16
+    """Gazes, and rays of the panorama, around the horizon."""
+    pitches: int = 7
+    """Gazes, and rays of the panorama, from -45° to 45°."""
+    learning_rate: float = 1e-3
+    """Adam's learning rate at first; it falls linearly to a twentieth."""
+    discount: DiscountUnit = "seconds"
+    """What the discount is counted in: seconds or decisions."""
+    gamma: float = 0.9
+    """Discount factor per second, or per decision."""
+    gae_lambda: float = 0.95
+    """λ of generalised advantage estimation, per decision."""
+    clip: float = 0.2
+    """Clipping range of PPO's probability ratio."""
+    entropy: float = 0.003
+    """Weight of the entropy bonus."""
+    epochs: int = 4
+    """Passes over the decisions of a rollout, or an iteration, in an update."""
+    validation_missions: int = 32
+    """Missions in a validation."""
+
+
 _POSITIVE = (
     "total_steps", "missions", "batch", "epochs", "checkpoint_every", "validate_every", "validation_missions",
 )  # fmt: skip
 
 
-def check_options(args: Any) -> None:  # noqa: ANN401 - the options of either trainer
+def check_options(args: Any) -> None:  # noqa: ANN401 - LearningOptions, and what both trainers add to them
     """Raise a SettingError where an option that every trainer has is out of its range."""
     for name in _POSITIVE:
         check_whole(name, getattr(args, name), 1)

@@ -32,7 +32,7 @@ from training.validation import Validation
         ("--learning-rate nan", "learning_rate = nan"),
         ("--gamma 1.1", "gamma = 1.1"),
         ("--entropy -1", "entropy = -1"),
-        ("--hidden 0", "hidden = [0]"),
+        ("--hidden 0", "hidden = (0,)"),
         ("--address somewhere", "HOST:PORT of a Ray cluster"),
         ("--resume nowhere", "the folder of a run"),
         ("--no-such-option 1", "no-such-option"),
