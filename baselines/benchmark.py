@@ -214,8 +214,12 @@ def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
     given = given_all.get("task", {})
     if args.suite is not None:
         suite_strategies(args.suite)  # refuses an unknown suite first
-        for name in (*given, *(name for name in _PINNED if name in given_all)):
-            raise SettingError(name, "given", "no value beside --suite, which pins it")
+        pinned = {**given, **{name: given_all[name] for name in _PINNED if name in given_all}}
+        for name, value in pinned.items():
+            while isinstance(value, dict):
+                inner, value = next(iter(value.items()))
+                name = inner if name == "world_file" else f"{name}.{inner}"
+            raise SettingError(name, value, "no value beside --suite, which pins it")
         return find_suite(args.suite, args.quick, chosen_strategies(args.strategies, args.suite)), []
     if args.world_scenario is not None and args.world_scenario not in SCENARIOS:
         raise SettingError("world_scenario", args.world_scenario, one_of(args.world_scenario, SCENARIOS))

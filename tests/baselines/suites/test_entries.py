@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shutil
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 
@@ -14,7 +13,7 @@ from baselines.cli.arguments import run_command
 from baselines.experiments.rows import read_table, write_table
 from baselines.suites.entries import ROWS, check_entry, record_file
 from baselines.suites.page import entries_table
-from baselines.suites.suite import TIME, TIME_90, task_in
+from baselines.suites.suite import task_in
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.mission_record import load_record, save_record
 from entropy_explore_env.settings.scenarios import BOX
@@ -29,16 +28,14 @@ def tiny_tasks(quick):
 
 @pytest.fixture(autouse=True)
 def tiny(monkeypatch):
-    module = SimpleNamespace(TITLE="Tiny", MEASURES=(TIME, TIME_90), STRATEGIES=("random",), tasks=tiny_tasks)
-    monkeypatch.setitem(suites.SUITES, "tiny", module)
+    monkeypatch.setitem(suites.SUITES, "tiny", suites.Pinned("Tiny", tiny_tasks, ("random",)))
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("entries") / "mine"
     with pytest.MonkeyPatch.context() as patch:
-        module = SimpleNamespace(TITLE="", MEASURES=(TIME, TIME_90), STRATEGIES=("random",), tasks=tiny_tasks)
-        patch.setitem(suites.SUITES, "tiny", module)
+        patch.setitem(suites.SUITES, "tiny", suites.Pinned("Tiny", tiny_tasks, ("random",)))
         stopped = [*WORDS, "--entry", str(folder), "--stop-after-s", "0"]
         assert run_command(benchmark.main, stopped) == 0 and not (folder / ROWS).exists()
         assert run_command(benchmark.main, stopped[:-2]) == 0
