@@ -11,35 +11,14 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from benchmarks.rows import Effort, Goal, Row, alone, compared
 from entropy_explore_env.errors import MissingExtraError
 
 THREADS = (1, 2)
-
-
-class Round(NamedTuple):
-    """What one rollout and the update of the networks took.
-
-    Attributes:
-        steps: Robot-steps.
-        environment_s: Stepping the missions: sensing, fusing, sharing, observing.
-        choosing_s: The policy's choices.
-        collecting_s: The rollout: both, and keeping what came of it.
-        learning_s: Updating the networks.
-    """
-
-    steps: int
-    environment_s: float
-    choosing_s: float
-    collecting_s: float
-    learning_s: float
-
-    @property
-    def whole_s(self) -> float:
-        """The loop."""
-        return self.collecting_s + self.learning_s
+PARTS = {"environment": "the environment", "choosing": "the policy's choices", "learning": "learning"}
+"""Part of the loop that is timed → its words: stepping the missions, choosing, updating the networks."""
 
 
 class Loop:
@@ -66,7 +45,7 @@ class Loop:
         args = parsed(["--threads", str(threads), "--out", str(folder / f"run-{threads}"), *words])
         self._state = set_up(args, training_task(args))
         self._steps = args.rollout_steps * self._state.envs.num_envs
-        self._spent = {"environment": 0.0, "choosing": 0.0, "learning": 0.0}
+        self._spent = dict.fromkeys(PARTS, 0.0)
         model: Any = self._state.model
         self._state.envs.step = self._timed("environment", self._state.envs.step)
         model.choose = self._timed("choosing", model.choose)
@@ -81,9 +60,9 @@ class Loop:
 
         return timed
 
-    def round(self) -> Round:
-        """One rollout, and what is learned from it."""
-        self._spent = dict.fromkeys(self._spent, 0.0)
+    def round(self) -> dict[str, float]:
+        """Return the `steps` of a rollout, its `seconds` with the update after it, and those of each part."""
+        self._spent = dict.fromkeys(PARTS, 0.0)
         before = self._torch.get_num_threads()
         self._torch.set_num_threads(self._threads)
         began = time.perf_counter()
@@ -91,9 +70,7 @@ class Loop:
             self._state.model.learn(self._steps, log_interval=2**31, reset_num_timesteps=False)
         finally:
             self._torch.set_num_threads(before)
-        whole_s, spent = time.perf_counter() - began, self._spent
-        collecting_s = whole_s - spent["learning"]
-        return Round(self._steps, spent["environment"], spent["choosing"], collecting_s, spent["learning"])
+        return {"steps": self._steps, "seconds": time.perf_counter() - began, **self._spent}
 
     def close(self) -> None:
         """End its threads."""
@@ -102,11 +79,11 @@ class Loop:
 
 def learning_rounds(
     threads: Sequence[int], rounds: int, words: tuple[str, ...] = ()
-) -> dict[int, list[Round]]:
+) -> dict[int, list[dict[str, float]]]:
     """Learn on this many threads each, taking turns; a rollout of each before warms up."""
     with tempfile.TemporaryDirectory() as folder:
         loops = {count: Loop(count, words, Path(folder)) for count in threads}
-        found: dict[int, list[Round]] = {count: [] for count in threads}
+        found: dict[int, list[dict[str, float]]] = {count: [] for count in threads}
         for _ in range(1 + rounds):
             for count, loop in loops.items():
                 found[count].append(loop.round())
@@ -118,23 +95,21 @@ def learning_rounds(
 def learning_rows(effort: Effort, words: tuple[str, ...] = ()) -> list[Row]:
     """Robot-steps a second of the loop and of collecting, and the parts of the loop's time."""
     found = learning_rounds(THREADS, 8 if effort.large else 2, words)
-    whole = {threads: [each.steps / each.whole_s for each in own] for threads, own in found.items()}
-    collecting = {threads: [each.steps / each.collecting_s for each in own] for threads, own in found.items()}
+    whole = {threads: [each["steps"] / each["seconds"] for each in own] for threads, own in found.items()}
+    collecting = {
+        threads: [each["steps"] / (each["seconds"] - each["learning"]) for each in own]
+        for threads, own in found.items()
+    }
     unit, rows = "robot-steps/s", list[Row]()
     for job, rates in (("PPO collecting", collecting), ("PPO", whole)):
         job = f"{job}, 64 missions × 3 robots"
         rows.append(alone(f"{job}, 1 thread", rates[1], unit))
         rows.append(compared(f"{job}, 2 threads", "1 thread", rates[2], rates[1], unit))
     rows.append(alone("PPO, 64 missions × 3 robots, 2 threads", whole[2], unit, Goal("≥", 12_000, unit)))
-    shares = {
-        "the environment": [each.environment_s / each.whole_s for each in found[2]],
-        "the policy's choices": [each.choosing_s / each.whole_s for each in found[2]],
-        "learning": [each.learning_s / each.whole_s for each in found[2]],
-        "keeping the rollout": [
-            (each.collecting_s - each.environment_s - each.choosing_s) / each.whole_s for each in found[2]
-        ],
-    }
-    goals = {"the environment": Goal("≤", 50, "%")}
-    for part, share in shares.items():
-        rows.append(alone(f"of that {part}", [100.0 * each for each in share], "%", goals.get(part)))
+    rest = [each["seconds"] - sum(each[part] for part in PARTS) for each in found[2]]
+    spent = {told: [each[part] for each in found[2]] for part, told in PARTS.items()}
+    for told, seconds in {**spent, "keeping the rollout": rest}.items():
+        shares = [100.0 * own / each["seconds"] for own, each in zip(seconds, found[2], strict=True)]
+        goal = Goal("≤", 50, "%") if told == PARTS["environment"] else None
+        rows.append(alone(f"of that {told}", shares, "%", goal))
     return rows

@@ -6,34 +6,16 @@ import csv
 import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from tabulate import DataRow, TableFormat, tabulate
-
-_ROW = DataRow("| ", " | ", " |")
-
-
-def _rule(widths: Sequence[int], alignments: Sequence[str]) -> str:
-    """Return the line below the head."""
-    del alignments
-    return "| " + " | ".join("---" for _ in widths) + " |"
-
-
-_MARKDOWN = TableFormat(
-    lineabove=None,
-    linebelowheader=_rule,
-    linebetweenrows=None,
-    linebelow=None,
-    headerrow=_ROW,
-    datarow=_ROW,
-    padding=0,
-    with_header_hide=None,
-)
-"""Markdown without padding: a number that changes its width leaves the other lines of a page as they are."""
+from tabulate import tabulate
 
 
 def markdown_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    """Return a Markdown table; cells stand in it as `str` has them."""
-    text = tabulate(rows, head, _MARKDOWN, disable_numparse=True, stralign=None, numalign=None)
-    return text + "\n"
+    """Return a Markdown table; cells stand in it as `str` has them.
+
+    Nothing is padded: a number that changes its width leaves the other lines of a page as they are.
+    """
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(map(str, line))} |\n" for line in lines)
 
 
 def terminal_table(head: Sequence[str], rows: Sequence[Sequence[object]], widest: int = 60) -> str:
