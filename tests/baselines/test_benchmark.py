@@ -251,42 +251,20 @@ def test_the_reference_is_always_there_and_first():
     assert chosen_strategies("gradient", "faults") == ("gradient",)
 
 
-def test_the_page_of_a_file_does_not_say_where_it_lies(tmp_path):
-    image = Image.fromarray(np.full((30, 44), 254, np.uint8))
-    path = tmp_path / "a plan.png"
-    image.save(path)
-    words = ["--world", str(path), "--strategies", "random", "--robots", "1", "--seeds", "1"]
-    words += ["--jobs", "1", "--time-limit-s", "20", "--out", str(tmp_path / "out"), "--json"]
-    assert run_command(benchmark.main, words) == 0
-    page = (tmp_path / "out" / "own.md").read_text()
-    assert "--world 'a plan.png'" in page and "world file `a plan.png`, " in page
-    assert str(tmp_path) not in page and "1 ground robot" in page
-
-
 @pytest.mark.parametrize(
     "words",
     [
         ["--suite", "plan"],
         ["--suite", "plans", "--scenarios", "room"],
-        ["--suite", "plans", "--seeds", "3"],
         ["--suite", "faults", "--time-limit-s", "3"],
-        ["--suite", "plans", "--strategies", "magic"],
         ["--scenarios", "rooom"],
         ["--scenarios", "room,room"],
-        ["--scenarios", "nowhere.bt"],
-        ["--scenarios", ""],
         ["--world", "nowhere.bt"],
-        ["--world", "pyproject.toml"],
         ["--strategies", "magic"],
-        ["--strategies", "random,"],
         ["--robots", "0"],
         ["--robots", "2,2"],
-        ["--robots", "two"],
-        ["--robots", "1,"],
-        ["--robots", "-1"],
         ["--seeds", "0"],
         ["--jobs", "0"],
-        ["--time-limit-s", "0"],
         ["--time-limit-s", "inf"],
         ["--wall-limit-s", "nan"],
         ["--stop-after-s", "-1"],

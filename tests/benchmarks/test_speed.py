@@ -57,23 +57,6 @@ def test_json_is_one_object_with_machine_and_rows(measured, capsys):
     assert "[1/1] sums" in err
 
 
-def test_table_names_every_job_and_goal(measured, capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "200")
-    measured(HELD, MISSED, FREE)
-    assert run() == 0
-    out = capsys.readouterr().out
-    for word in ("sums", "starts", "a peer", "≥ 1 ×", "< 2 s", "1.5 ×", "yes", "no"):
-        assert word in out
-
-
-def test_quick_measures_less(monkeypatch, capsys):
-    efforts: list[Effort] = []
-    monkeypatch.setattr(speed, "JOBS", {"sums": lambda effort: efforts.append(effort) or [HELD]})
-    run("--quick", "--json")
-    run("--json")
-    assert efforts[0].rounds < efforts[1].rounds and efforts[0].scans < efforts[1].scans
-
-
 def test_strict_asks_for_every_goal(measured, capsys):
     measured(HELD, FREE)
     assert run("--strict", "--json") == 0

