@@ -293,16 +293,8 @@ def _sweep(board, factor, limit, together, moving):
 def _relax_rows(own, other, shares, factor, last, white, limit):
     """Relax the squares of a colour in some rows; returns how many changed by more than a limit.
 
-    The margin's squares are relaxed, too, and do not change: their shares are 0.
-
-    Args:
-        own: (X + 2, W), squares of the colour.
-        other: (X + 2, W), of the other one.
-        shares: (X + 2, W), of the colour.
-        factor: ω.
-        last: The last of `_ROWS_AT_ONCE` rows; of these those within the board are relaxed.
-        white: Whether the colour is white.
-        limit: Smaller changes do not count.
+    The margin's squares are relaxed, too, and do not change: their shares are 0. The rows are those within
+    the board of the `_ROWS_AT_ONCE` rows that end with the last one.
     """
     count = 0
     for row in range(max(last - _ROWS_AT_ONCE + 1, 1), min(last, own.shape[0] - 2) + 1):

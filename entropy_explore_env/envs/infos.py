@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -90,7 +91,8 @@ def robot_infos(missions: Missions, mission: int, texts: bool = True) -> list[di
         for info, mask in zip(infos, missions.action_masks()[mission], strict=True):
             info["action_mask"] = mask
     if clock["end"] and texts:
+        figures = mission_figures(missions, mission)
         for info in infos:
-            info["figures"] = mission_figures(missions, mission)
-            info |= end_figures(info["figures"])
+            info["figures"] = copy.deepcopy(figures)
+            info |= end_figures(figures)
     return infos

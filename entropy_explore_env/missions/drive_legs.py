@@ -57,15 +57,9 @@ def drive_leg(params, collision, robots, index, time_s, crossing):
 
 @lean_kernel
 def distance_to_tube(params, mate, time_s, line, distance, touching):
-    """How far a body can drive on a line before the tube that a teammate still sweeps.
+    """Return how much of a distance, in grid units, a body can drive on a line before a teammate's tube.
 
-    Args:
-        line: Line of the drive.
-        distance: How far it wants to drive, in grid units.
-        touching: Sum of the two radii in grid units.
-
-    Returns:
-        The distance in grid units, at most `distance`.
+    `mate` still sweeps the tube; `touching` is the sum of the two radii in grid units.
     """
     x, y, z, passed = place_at(params, mate, time_s)
     begin = to_grid_units(params, (x, y, z))

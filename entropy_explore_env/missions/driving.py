@@ -165,14 +165,9 @@ def brake_first(robot, choice, rests, braking):
 
 @lean_kernel
 def rest_on_path(params, robot, rests, braking):
-    """Let a drive that is too short to come to rest on end where the robot comes to rest on its old path.
+    """Let a drive that is too short to come to rest on end where its robot comes to rest on its old path.
 
-    Args:
-        rests: How many points there are in `braking`.
-        braking: As `leave_path` filled it in.
-
-    Returns:
-        Whether the drive was too short.
+    That is behind the first `rests` points of `braking`. Returns whether the drive was too short.
     """
     if braking is None:  # known while compiling: nothing of the rest is compiled
         return False

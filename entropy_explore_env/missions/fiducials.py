@@ -108,13 +108,7 @@ def way_to(place, other):
 
 @lean_kernel
 def measured_way(own, estimate, away):
-    """(x, y, z) of a landmark as a robot measures it, turned by the yaw that it believes.
-
-    Args:
-        own: LOCALIZATION_PARAMS of the robot.
-        estimate: ESTIMATE; its random state of sightings is drawn from.
-        away: (x, y, z), where it truly is from the robot.
-    """
+    """(x, y, z) of a landmark truly `away`, as a robot measures it, turned by the yaw that it believes."""
     error = sighting_error(away, own.range_sigma_m, own.bearing_sigma_rad, estimate.sighting_rng)
     x, y, z = away[0] + error[0], away[1] + error[1], away[2] + error[2]
     along, across = math.cos(estimate.error[3]), math.sin(estimate.error[3])
@@ -123,12 +117,9 @@ def measured_way(own, estimate, away):
 
 @lean_kernel
 def in_sight(params, sensor, scene, pose, away):
-    """Whether a scan sights a landmark: in range, in its field of view, nothing before it.
+    """Whether a scan sights a landmark that is `away`: in range, in its field of view, nothing before it.
 
-    Args:
-        params: LOCALIZATION_PARAMS of the robot.
-        sensor: SENSOR_PARAMS of its sensor.
-        away: (x, y, z), from the robot to the landmark, metres.
+    `params` are LOCALIZATION_PARAMS, `sensor` SENSOR_PARAMS of the robot.
     """
     x, y, z = away
     distance = math.sqrt(x * x + y * y + z * z)

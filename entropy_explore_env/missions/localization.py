@@ -50,11 +50,9 @@ class TeamLocalization(NamedTuple):
 
 
 def begin_estimates(seed: int, episode: int, poses: np.ndarray, estimates: np.ndarray) -> None:
-    """Let robots know exactly where they start, and set their random states.
+    """Let robots know exactly where they start, poses (A, 5), and set their random states.
 
-    Args:
-        poses: (A, 5) float64.
-        estimates: (A,) ESTIMATE of zeros, filled in; empty where no robot drifts.
+    The (A,) ESTIMATE are zeros, or empty where no robot drifts.
     """
     if len(estimates):
         estimates["place"], estimates["yaw"], estimates["scan_pose"] = poses[:, :3], poses[:, 3], poses
@@ -243,11 +241,7 @@ def believe_scan(localization, index, scan, sensor, scene, pose):
 
 @lean_kernel
 def note_scan_pose(localization, index, pose):
-    """Keep where a robot believes to have scanned, and count how wrong it was.
-
-    Args:
-        pose: (x, y, z, yaw, pitch), where it believes to have been.
-    """
+    """Keep where a robot believes to have scanned, and count how wrong it was."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return
     estimate = localization.estimates[index]

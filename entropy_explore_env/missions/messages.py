@@ -117,9 +117,7 @@ def note_message(robot, heard, position, sent_s, count, bits):
 
     Args:
         robot: ROBOT that hears it.
-        heard: HEARD of its sender.
         position: (x, y, z, yaw, pitch), where the sender believed to be.
-        sent_s: When.
         count: Measurements in it; -1 = an announcement.
         bits: What it costs.
 
@@ -152,7 +150,6 @@ def message_bits(localization, count):
 
     Args:
         localization: Of the Team: where robots drift, batches carry their senders' covariances.
-        count: Measurements in it.
     """
     if count < 0:
         return BITS_PER_ANNOUNCEMENT
@@ -172,10 +169,7 @@ def transmit(team, index, place, time_s, recipients):
     """Draw whom a broadcast reaches, and count whom it does not; returns whether it reaches anybody.
 
     Args:
-        team: Team.
-        index: The sender.
         place: (x, y, z), where it sends from.
-        time_s: When.
         recipients: (A,) bool, filled in.
     """
     robot, shared, heard = team.robots[index], team.params[0], False
@@ -206,11 +200,8 @@ def passes(air, team, mate, place, time_s):
     """Whether walls, and the distance, let a message through to a teammate.
 
     Args:
-        air: Of the Team.
-        team: Team.
         mate: Who is to hear it.
         place: (x, y, z), where it is sent from.
-        time_s: When.
     """
     if air is None:  # known while compiling: nothing of the rest is compiled
         return True
@@ -231,10 +222,6 @@ def enqueue(clock, team, in_flight, index, count, recipients, delay_s):
     A state from outside may have none.
 
     Args:
-        clock: MISSION.
-        team: Team.
-        in_flight: InFlight.
-        index: The sender's number.
         count: Measurements in it; -1 = an announcement.
         recipients: (A,) bool, which robots will hear it.
         delay_s: How long it is under way.
@@ -280,13 +267,9 @@ def unpack_measurements(params, tracer, sender, scan, pose, packed, count):
     """Put packed measurements into a scan as if it had been taken at the sender's pose.
 
     Args:
-        params: PARAMS of any robot.
-        tracer: Tracer.
-        sender: Who measured.
         scan: Scan, filled in.
         pose: (5,) where the measurements were taken.
         packed: (B, 5), see `pack_measurements`.
-        count: How many there are.
     """
     size, start, sensor = grid_size(params), within_grid(params, pose), tracer.sensors[sender]
     for i in range(count):
@@ -300,18 +283,7 @@ def unpack_measurements(params, tracer, sender, scan, pose, packed, count):
 
 @lean_kernel
 def send_batch(team, maps, clock, in_flight, scan, index, count, recipients):
-    """Broadcast `count` measurements of `scan.order`, which teammates fuse at once or after the delay.
-
-    Args:
-        team: Team.
-        maps: Maps.
-        clock: MISSION.
-        in_flight: InFlight.
-        scan: Scan of the sender.
-        index: The sender.
-        count: How many measurements.
-        recipients: (A,) bool, scratch space.
-    """
+    """Broadcast `count` measurements of `scan.order`, which teammates fuse at once or after the delay."""
     robot = team.robots[index]
     delay_s = team.params[0].delay_s + draw_lateness(team.faults, index)
     time_s, bits = clock.time_s, message_bits(team.localization, count)
@@ -361,16 +333,7 @@ def count_sent(robot, count, bits):
 
 @lean_kernel
 def receive(team, maps, in_flight, slot, tracer, scan):
-    """Deliver a delayed message: recipients fuse it, or note what it announces; its slot is free again.
-
-    Args:
-        team: Team.
-        maps: Maps.
-        in_flight: InFlight.
-        slot: Of the message.
-        tracer: Tracer.
-        scan: Scan, scratch space.
-    """
+    """Deliver a delayed message: recipients fuse it, or note what it announces; its slot is free again."""
     message = in_flight.messages[slot]
     time_s, bits = message.due_s, message_bits(team.localization, message.count)
     message.due_s = math.inf

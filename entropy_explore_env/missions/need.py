@@ -47,9 +47,6 @@ def share_by_need(backlog, mission, scan, sensor, index, recipients):
         backlog: TeamBacklog, or None.
         mission: Mission.
         scan: Scan of the robot, with the utility of each ray; then scratch space.
-        sensor: SensorModel of the robot.
-        index: Its number.
-        recipients: (A,) bool, scratch space.
 
     Returns:
         Whether robots send by need, and no other batches.

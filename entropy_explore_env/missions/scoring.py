@@ -69,11 +69,7 @@ def driven_m(robots):
 def holds_enough(clock, visible, truth, precision, prior_precision):
     """Whether a robot's own map holds as much of what can be seen as ends the mission.
 
-    It counts all voxels: for missions whose joint map holds enough already.
-
-    Args:
-        precision: (V,) float32 of the robot's belief.
-        prior_precision: 1/σ² of a voxel that it neither measured nor was told of.
+    It counts all voxels of more than the prior precision: for missions whose joint map holds enough already.
     """
     prior, seen, free = np.float32(prior_precision), 0, 0
     for voxel in range(len(precision)):

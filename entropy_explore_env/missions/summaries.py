@@ -88,13 +88,7 @@ def send_summary(summaries, team, maps, clock, in_flight, index, length, recipie
 
 @lean_kernel
 def note_summary(team, recipients, sender, pose, sent_s, time_s, bits):
-    """Count a summary with the robots that take it in, and note where its sender was.
-
-    Args:
-        recipients: (A,) bool, which robots it reaches; in place, which take it in.
-        pose: (x, y, z, yaw, pitch), where the sender believed to be.
-        bits: What it costs.
-    """
+    """Count a summary with recipients (A,), reduced to those that take it in; note where its sender was."""
     for mate in range(len(team.robots)):
         if recipients[mate]:
             recipients[mate] = takes_in(team.faults, team.robots[mate], mate, time_s, bits)
@@ -162,11 +156,7 @@ def sent_precision(localization, covariances, slot, voxel_size_m):
 
 @lean_kernel
 def precision_of_place(packed, voxel_size_m):
-    """Return 1/σ² of coverage by how well a place is known: vsz² / tr Σ of x, y, z; inf = exactly.
-
-    Args:
-        packed: (10,) float64, see `robots.localization.pack_covariance`.
-    """
+    """Return 1/σ² of coverage by how well a place is known: vsz² / tr Σ of x, y, z; inf = exactly."""
     off = packed[0] + packed[4] + packed[7]
     return voxel_size_m * voxel_size_m / off if off > 0.0 else math.inf
 

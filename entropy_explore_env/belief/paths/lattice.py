@@ -24,9 +24,6 @@ IMPASSABLE, FREE, UNKNOWN = 0, 1, 2
 KNOWN_RATIO = 2.0
 """A voxel is known once its precision is this many times the prior one, that is, half a bit was gained."""
 
-MAX_COST_RATIO = 1e6
-"""Largest ratio of traversal costs: a search visits one bucket for each cheapest step."""
-
 _GRAIN = 2.0**-30
 DIAGONALS = (1.0, round(math.sqrt(2.0) / _GRAIN) * _GRAIN, round(math.sqrt(3.0) / _GRAIN) * _GRAIN)
 """Lengths of steps along one, two and three axes, to 2⁻³⁰: sums up to 2²² are exact in any order.
@@ -79,7 +76,7 @@ class Lattice(NamedTuple):
 class Costs(NamedTuple):
     """Traversal costs, from a belief or from a field.
 
-    Made by `belief_costs` or `field_costs`; kernels fill one in themselves.
+    Made by `belief_costs` or `costs_of`; kernels fill one in themselves.
     """
 
     mean: np.ndarray
@@ -193,17 +190,10 @@ def belief_costs(
         precision: The same shape, float32, 1/σ².
         prior_precision: 1/σ² of a voxel that was never measured; known are voxels with KNOWN_RATIO times as
             much.
-        unknown_cost: Traversal cost of unknown voxels.
+        unknown_cost: Traversal cost of unknown voxels, ≥ 1.
         no_fly: The same shape, bool, voxels that may not be entered whatever is believed: above a ceiling,
             see `worlds.world.no_fly_mask`. None = there are none.
-
-    Raises:
-        SettingError: The cost is no number from 1 to MAX_COST_RATIO, or `no_fly` has another shape or type.
     """
-    if no_fly is not None and (no_fly.shape != mean.shape or no_fly.dtype != np.bool_):
-        raise SettingError("no_fly", f"{no_fly.shape} {no_fly.dtype}", f"None, or {mean.shape} bool")
-    if not (1.0 <= unknown_cost <= MAX_COST_RATIO):
-        raise SettingError("unknown_cost", unknown_cost, f"a number from 1 to {MAX_COST_RATIO:g}")
     flat = _flat(mean)
     return Costs(
         mean=flat,
@@ -214,27 +204,6 @@ def belief_costs(
         min_per_edge=1.0,
         no_fly=NO_FLY_NOWHERE if no_fly is None else np.ascontiguousarray(no_fly).reshape(-1),
     )
-
-
-def field_costs(per_edge: np.ndarray) -> Costs:
-    """Traversal costs that are given voxel by voxel; the body's size plays no part.
-
-    Args:
-        per_edge: (X, Y, Z) or (V,) float32, > 0, cost of a path through a voxel per voxel edge; inf =
-            impassable.
-
-    Raises:
-        SettingError: A cost is not above 0, or it is finite and over MAX_COST_RATIO times the least one.
-    """
-    flat = _flat(per_edge)
-    least = float(flat.min(initial=np.inf))
-    if not least > 0.0:  # NaN is not either
-        raise SettingError("per_edge", least, "costs > 0; inf = impassable")
-    most = float(flat.max(initial=0.0, where=np.isfinite(flat)))
-    if most > MAX_COST_RATIO * least:
-        allowed = f"finite costs of at most {MAX_COST_RATIO:g} times the least, {least:g}"
-        raise SettingError("per_edge", most, allowed)
-    return costs_of(flat, least if math.isfinite(least) else 1.0)
 
 
 def costs_of(per_edge: np.ndarray, min_per_edge: float) -> Costs:

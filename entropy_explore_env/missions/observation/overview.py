@@ -9,11 +9,7 @@ OVERVIEW_CHANNELS = 2
 
 @lean_kernel
 def observe_overview(begin, cells, sums, row):
-    """Fill (2·C,): normalised entropy and expected coverage, averaged over each of the Cells.
-
-    Args:
-        sums: (2, C) float64 over them.
-    """
+    """Fill (2·C,): normalised entropy and expected coverage, means over Cells, from (2, C) sums."""
     if begin is None:  # known while compiling: nothing of the rest is compiled
         return
     out = row[begin:]

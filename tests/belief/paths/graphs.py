@@ -8,7 +8,7 @@ import math
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
+from entropy_explore_env.belief.paths.lattice import belief_costs, costs_of, new_lattice
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
 from entropy_explore_env.belief.paths.search import cost_to, extract_path, new_search
 from entropy_explore_env.compilation.kernels import lean_kernel
@@ -51,6 +51,14 @@ def random_rates(shape, seed, decades, walls=0.25):
 def known(covered):
     """Mean and precision of a belief that is sure of everything."""
     return covered.astype(np.float32), np.full(covered.shape, KNOWN, np.float32)
+
+
+def field_costs(per_edge):
+    """Traversal costs that are given voxel by voxel, > 0; inf = impassable."""
+    flat = np.ascontiguousarray(per_edge, np.float32).reshape(-1).view()
+    flat.setflags(write=False)
+    least = float(flat.min(initial=np.inf))
+    return costs_of(flat, least if math.isfinite(least) else 1.0)
 
 
 @lean_kernel

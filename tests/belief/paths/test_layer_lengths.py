@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse.csgraph import dijkstra
 
-from entropy_explore_env.belief.paths.lattice import field_costs, new_lattice
+from entropy_explore_env.belief.paths.lattice import new_lattice
 from entropy_explore_env.belief.paths.layer_lengths import fill_layer_lengths
 from entropy_explore_env.belief.paths.search import cost_to, new_search
-from tests.belief.paths.graphs import all_costs, graph_of
+from tests.belief.paths.graphs import all_costs, field_costs, graph_of
 from tests.reference.scenes import drawn, seeds
 
 SQRT2 = math.sqrt(2.0)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse.csgraph import dijkstra
 
-from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, belief_costs, field_costs, new_lattice
+from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, belief_costs, new_lattice
 from entropy_explore_env.belief.paths.planning import (
     ANY_GOAL,
     resume_search,
@@ -28,6 +28,7 @@ from tests.belief.paths.graphs import (
     UNKNOWN,
     all_costs,
     costs_to_all,
+    field_costs,
     graph_of,
     known,
     plan,
@@ -300,13 +301,6 @@ def test_given_costs_hold_for_bodies_of_any_size(radius):
         (lambda: new_lattice(SIZE, -0.1), "body_radius"),
         (lambda: new_lattice(SIZE, math.nan), "body_radius"),
         (lambda: new_lattice(SIZE, 0.0, 5), "layer"),
-        (lambda: belief_costs(*known(np.zeros(SIZE, bool)), PRIOR, 0.99), "unknown_cost"),
-        (lambda: belief_costs(*known(np.zeros(SIZE, bool)), PRIOR, math.inf), "unknown_cost"),
-        (lambda: belief_costs(*known(np.zeros(SIZE, bool)), PRIOR, 1.0, np.zeros(SIZE)), "no_fly"),
-        (lambda: belief_costs(*known(np.zeros(SIZE, bool)), PRIOR, 1.0, np.zeros(7, bool)), "no_fly"),
-        (lambda: field_costs(np.zeros(SIZE, np.float32)), "per_edge"),
-        (lambda: field_costs(np.full(SIZE, math.nan, np.float32)), "per_edge"),
-        (lambda: field_costs(np.array([1.0, 1.1e6, math.inf], np.float32)), "per_edge"),
     ],
 )
 def test_what_is_refused(ask, field):
