@@ -103,7 +103,7 @@ class FrontierMap(ABC):
         self.reach = min(kind.sensor.max_range_m / self._edge, float(sum(grid.shape)))
         self._spacing = max(round((frontiers.spacing_m or self.reach * self._edge / 6.0) / self._edge), 1)
         """Voxels between candidates."""
-        self.changed, self._sigma = 0, math.nan
+        self.changed = 0
 
     def _start(self, points: int) -> None:
         """Prepare counts of points, once states, blocks, costs and candidates are there."""
@@ -123,8 +123,6 @@ class FrontierMap(ABC):
         """Bring the map up to date with the belief; σ is the level that counts as explored now."""
         least = self._prior * (1.0 + 1e-6)
         levels = np.float32(max(sigma**-2, least)), np.float32(max(KNOWN_SIGMA**-2, least))
-        if sigma != self._sigma:
-            self._states.sums[:], self._sigma = 0, sigma
         self.changed = int(self._read(view.mean.reshape(-1), view.precision.reshape(-1), levels))
         opened = self._states.opened[: self._states.opened_count[0]]
         self._states.opened_count[0] = 0

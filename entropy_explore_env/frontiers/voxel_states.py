@@ -14,8 +14,8 @@ from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.frontiers.blocks import COVERED, UNEXPLORED, UNMAPPED
 
-_SUMMED = 128
-"""Voxels that are checked together for new measurements."""
+_TOGETHER = 128
+"""Voxels that are compared together, without branches, before single ones are."""
 
 
 class VoxelStates(NamedTuple):
@@ -29,8 +29,6 @@ class VoxelStates(NamedTuple):
     """(V + X·Y,) int32, the first `opened_count` are voxels past which more may be visible than before."""
     opened_count: np.ndarray
     """(1,) int64; set to 0 by the reader."""
-    sums: np.ndarray
-    """(V / _SUMMED,) uint64, sums of the bit patterns of precisions at the latest update; 0 = look anew."""
     size: tuple[int, int, int]
 
 
@@ -42,7 +40,6 @@ def new_states(shape: tuple[int, int, int]) -> VoxelStates:
         changed=np.zeros(voxels, np.int32),
         opened=np.zeros(voxels + shape[0] * shape[1], np.int32),
         opened_count=np.zeros(1, np.int64),
-        sums=np.zeros(math.ceil(voxels / _SUMMED), np.uint64),
         size=(int(shape[0]), int(shape[1]), int(shape[2])),
     )
 
@@ -64,29 +61,24 @@ def note_opened(states, voxel):
 
 @lean_kernel
 def update_states(states, mean, precision, levels):
-    """Bring the states up to date with a belief: sums over all voxels, and work where something changed.
-
-    A measurement raises a voxel's precision, and with it the integer that its bit pattern represents. So the
-    sum over some voxels is unchanged only if none of them was measured. (A measurement too weak to raise a
-    float32 does not change the mean either.)
+    """Bring the states up to date with a belief.
 
     Args:
-        states: Of the robot; its sums are 0 where the levels are others than at the latest update.
-        mean: (V,) float32, changed since the latest update only where the precision was raised.
-        precision: (V,) float32 1/σ² > 0, nowhere less than at the latest update.
+        states: Of the robot.
+        mean: (V,) float32.
+        precision: (V,) float32 1/σ² > 0.
         levels: (explored, mapped): precisions from which on a voxel is explored, and mapped.
 
     Returns:
         How many voxels are in another state than at the latest update.
     """
-    state, count, bits = states.state, 0, precision.view(np.uint32)
-    for first in range(0, len(state), _SUMMED):
-        last, total = min(first + _SUMMED, len(state)), np.uint64(0)
+    state, count = states.state, 0
+    for first in range(0, len(state), _TOGETHER):
+        last, different = min(first + _TOGETHER, len(state)), np.uint8(0)
         for voxel in range(first, last):
-            total += np.uint64(bits[voxel])
-        if total == states.sums[first // _SUMMED]:
+            different |= state[voxel] ^ _state_of(mean[voxel], precision[voxel], levels)
+        if different == 0:
             continue
-        states.sums[first // _SUMMED] = total
         for voxel in range(first, last):
             before, now = state[voxel], _state_of(mean[voxel], precision[voxel], levels)
             if now != before:

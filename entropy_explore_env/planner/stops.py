@@ -8,7 +8,7 @@ from entropy_explore_env.frontiers.knowledge import centres_of, voxel_of
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 
-_WITHIN_REACH = 0.999
+WITHIN_REACH = 0.999
 """Share of the reach that is used, so that rounding never moves a place towards the robot."""
 
 
@@ -28,7 +28,7 @@ def stop_towards(
         at_corners: Whether a robot that plans stops at corners, too.
     """
     robot, goal = view.kind.robot, goal[:3]
-    reach_m = robot.reach_m * _WITHIN_REACH
+    reach_m = robot.reach_m * WITHIN_REACH
     passes_corners = robot.navigator == "planned" and not at_corners
     if passes_corners and apart_m(view, goal) <= reach_m:
         return goal

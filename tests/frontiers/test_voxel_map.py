@@ -48,7 +48,6 @@ def new_voxel_map(shape, radius, layer, spacing):
 
 
 def updated(frontiers, mean, precision, levels=LEVELS):
-    frontiers.states.sums[:] = 0  # the levels may be others
     maps = frontiers.states, frontiers.blocks, frontiers.traversal_cost
     return update_voxels(*maps, mean.reshape(-1), precision.reshape(-1), levels)
 

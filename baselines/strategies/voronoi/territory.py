@@ -16,6 +16,7 @@ from entropy_explore_env.belief.paths.geodesic_cells import extract_path, new_te
 from entropy_explore_env.belief.paths.lattice import Lattice
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.frontiers.knowledge import belief_of, centres_of, teammates_that_share, voxel_of
+from entropy_explore_env.planner.stops import WITHIN_REACH
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import (
@@ -29,8 +30,6 @@ from entropy_explore_env.viewpoints.expected_scan import expected_bits
 
 _GAZES = 16
 _PITCHES = (-0.6, 0.0, 0.6)
-_WITHIN_REACH = 0.999
-"""Share of the reach that is used, so that rounding never moves a place towards the robot."""
 
 
 class Territory:
@@ -104,7 +103,7 @@ class Territory:
     def viewpoint_on(self, view: RobotKnowledge, path: np.ndarray) -> np.ndarray:
         """Return the viewpoint (5,) at the farthest place of a path that one drive reaches, the gaze best."""
         robot, viewpoint, places = view.kind.robot, view.pose.copy(), centres_of(view, path)
-        within = np.linalg.norm(places - view.pose[:3], axis=1) <= robot.reach_m * _WITHIN_REACH
+        within = np.linalg.norm(places - view.pose[:3], axis=1) <= robot.reach_m * WITHIN_REACH
         for index in np.flatnonzero(within)[::-1]:
             if index == 0 or robot.navigator == "planned" or self._line_is_free(view, places[index]):
                 viewpoint[:3] = places[index]
