@@ -234,18 +234,12 @@ def _take_in(board, heights):
 
 @lean_kernel
 def _relax(board, before, factor, sweeps, tolerance, moving):
-    """Successive over-relaxation of the unknown columns: all white squares, then all black ones, in a sweep.
+    """Successive over-relaxation by ω, `factor`: all white squares, then all black ones, in a sweep.
 
     Errors fall by ω - 1 a sweep, so that changes below (2 - ω) of the tolerance leave less than it. Some
     sweeps go over the rows together, each two rows behind the one before: the rows stay in the cache. Where
-    the first of them was the last that is needed, they are taken back, and it is done alone.
-
-    Args:
-        before: The same; scratch space.
-        factor: ω of the over-relaxation, in [1, 2).
-        sweeps: Most sweeps.
-        tolerance: In the unit of the heights.
-        moving: (S,) int64, scratch space for S sweeps together.
+    the first of them was the last that is needed, they are taken back, and it is done alone. Scratch space:
+    `before`, another Board, and `moving`, (S,) int64 for S sweeps together.
     """
     limit, left = (2.0 - factor) * tolerance, sweeps
     while left > 0:

@@ -32,12 +32,9 @@ _CERTAIN = 6.0
 
 @lean_kernel
 def fill_occupancy_entropy(mean, precision, entropy):
-    """Fill in the entropy of occupancy, e = -p ln p - (1 - p) ln(1 - p) with p = P(c > ½).
+    """Fill (V,) with nats of occupancy, e = -p ln p - (1 - p) ln(1 - p) with p = P(c > ½).
 
     Bhattacharya 2010, eq. 9, with the sign that it lacks.
-
-    Args:
-        entropy: (V,) float32, filled with nats, 0 … ln 2.
     """
     for voxel in range(len(mean)):
         mu, known = np.float64(mean[voxel]), np.float64(precision[voxel])

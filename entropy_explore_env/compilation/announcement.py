@@ -70,7 +70,8 @@ def explain_not_kept(folder: Path | None, error: OSError | None) -> None:
     if _progress.said_why_not_kept:
         return
     _progress.said_why_not_kept = True
-    where = "the user has no home folder" if folder is None else f"{short_path(folder)}: {_reason(error)}"
+    reason = "" if error is None else error.strerror or str(error)
+    where = "the user has no home folder" if folder is None else f"{short_path(folder)}: {reason}"
     _say(
         f"entropy_explore_env: compiled kernels are not kept ({where}), each process compiles them anew; "
         "set NUMBA_CACHE_DIR to a folder that can be written"
@@ -79,7 +80,7 @@ def explain_not_kept(folder: Path | None, error: OSError | None) -> None:
 
 def explain_no_stamp(reason: str) -> None:
     """Log why a kernel is compiled in each process."""
-    logging.getLogger("entropy_explore_env.compilation").info("compiled kernel is not kept: %s", reason)
+    _LOGGER.getChild("compilation").info("compiled kernel is not kept: %s", reason)
 
 
 def _say(line: str) -> None:
@@ -93,7 +94,3 @@ def short_path(folder: Path) -> str:
         return f"~/{folder.relative_to(Path.home()).as_posix()}"
     except (ValueError, RuntimeError):
         return str(folder)
-
-
-def _reason(error: OSError | None) -> str:
-    return "" if error is None else error.strerror or str(error)

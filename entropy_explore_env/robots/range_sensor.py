@@ -99,15 +99,7 @@ class Scene(NamedTuple):
 
 
 def true_coverage(occupied: np.ndarray, unreadable: np.ndarray | None) -> np.ndarray:
-    """Return what rays are cast through.
-
-    Args:
-        occupied: (X, Y, Z) bool, which voxels are solid.
-        unreadable: (X, Y, Z) bool, which of them give no return; None = all give one.
-
-    Returns:
-        (V,) float32: 0 free, 1 solid, 2 solid without return.
-    """
+    """Return (V,) float32, what rays are cast through: 0 free, 1 solid, 2 solid but unreadable."""
     coverage = occupied.ravel().astype(np.float32)
     if unreadable is not None:
         coverage[unreadable.ravel()] = _UNREADABLE

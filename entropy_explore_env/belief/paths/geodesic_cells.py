@@ -253,19 +253,10 @@ def _tessellate(space, starts, steps, per_cost, moves):
 def extract_path(
     space: Tessellation, traversal_cost: np.ndarray, voxel: int, length_cost: float, by_length: bool
 ) -> np.ndarray:
-    """Return the cheapest path from a cell's source to a voxel in it; it does not leave the cell.
+    """Return (N,) int64 voxels of the cheapest path from a cell's source to a voxel in it, both included.
 
-    Read off the costs backwards, without a search.
-
-    Args:
-        space: After `tessellate`.
-        traversal_cost: As in `tessellate`.
-        voxel: Where the path ends.
-        length_cost: As in `tessellate`.
-        by_length: Likewise.
-
-    Returns:
-        (N,) int64 voxels from the source to `voxel`, both included; none if no source reaches it.
+    It does not leave the cell, and is read off the costs backwards; none if no source reaches the voxel.
+    Costs are those of `tessellate`.
     """
     steps = np.array([(length if by_length else 1.0, length_cost * length) for length in DIAGONALS])
     cells, costs = space.cells, space.costs
