@@ -16,12 +16,19 @@ import numpy as np
 from entropy_explore_env.belief.belief_map import Map
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.explorer.canvas import grid_of
-from entropy_explore_env.explorer.goals import Decider, Goal, NoGoal, Why
+from entropy_explore_env.explorer.given_maps import (
+    UNKNOWN_BETWEEN,
+    Patch,
+    Values,
+    checked_origin,
+    has_size,
+    occupancy_of,
+    patch_of_map,
+    patch_of_occupancy,
+)
+from entropy_explore_env.explorer.goals import Decider, Goal, NoGoal, Why, checked_pose, poses_by_number
 from entropy_explore_env.explorer.ground import Ground, boxes_around
-from entropy_explore_env.explorer.occupancy import UNKNOWN_BETWEEN, Values, checked_origin, occupancy_of
-from entropy_explore_env.explorer.patches import Patch, has_size, patch_of_map, patch_of_occupancy
 from entropy_explore_env.explorer.planned_rate import PlannedRate
-from entropy_explore_env.explorer.poses import checked_pose, poses_by_number
 from entropy_explore_env.explorer.task import task_of
 from entropy_explore_env.explorer.team import Seat, view_of_seat
 from entropy_explore_env.explorer.workspace import Outlook, Workspace
@@ -146,7 +153,7 @@ class Explorer:
         """Take a map in place of what was believed of the voxels that it covers.
 
         Args:
-            grid: (X, Y) or (X, Y, Z) occupancies, see `occupancy.occupancy_of`; or a Map with σ.
+            grid: (X, Y) or (X, Y, Z) occupancies, see `given_maps.occupancy_of`; or a Map with σ.
             origin: (x, y, yaw) of the grid's corner in the map frame, yaw counter-clockwise about it. None =
                 as that of the latest map, if this one has its size; of the first one (0, 0, 0).
             bottom_m: Height z of the corner.

@@ -11,7 +11,7 @@ from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.replacement import replace_region
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.explorer.canvas import Canvas, box_of, grid_of
-from entropy_explore_env.explorer.patches import Patch
+from entropy_explore_env.explorer.given_maps import Patch
 from entropy_explore_env.explorer.workspace import Workspace
 from entropy_explore_env.robots.rotations import turned_by
 from entropy_explore_env.settings.grid import Grid

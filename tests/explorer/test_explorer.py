@@ -15,8 +15,8 @@ from baselines.strategies.rules.nearest_frontier import NearestFrontier
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import CallOrderError, SettingError
 from entropy_explore_env.explorer.explorer import Explorer
+from entropy_explore_env.explorer.given_maps import occupancy_of
 from entropy_explore_env.explorer.goals import NoGoal, Why
-from entropy_explore_env.explorer.occupancy import occupancy_of
 from entropy_explore_env.explorer.planned_rate import PlannedRate
 from entropy_explore_env.planner.weights import shipped_weights
 from entropy_explore_env.robots.rotations import turned_by
