@@ -46,16 +46,19 @@ def test_truth_and_collision_change_and_beliefs_do_not():
 
 
 def test_figures_of_the_joint_map_follow_the_truth():
+    """Where a wall comes, and where it goes again."""
     env = begun(track_truth=True)
     drive(env, 0.75)
     drive(env, 0.25)
-    env.set_world_block(*DOOR)
     state = env.missions.state
     clock, mean, truth = state.missions[0], state.joint_mean[0], state.truth[0]
     known = state.joint_precision[0] > np.float32(30.0**-2)
-    assert clock["wrong"] == ((mean > 0.5) != (truth > 0.5))[known].sum() > 0
-    assert clock["error"] == pytest.approx(np.abs(mean.astype(float) - truth)[known].sum())
-    assert clock["explored_free"] == (known & state.visible[0] & (truth < 0.5)).sum()
+    for solid in (True, False):
+        env.set_world_block(*DOOR, solid=solid)
+        assert clock["wrong"] == ((mean > 0.5) != (truth > 0.5))[known].sum()
+        assert (clock["wrong"] > 0) == solid
+        assert clock["error"] == pytest.approx(np.abs(mean.astype(float) - truth)[known].sum())
+        assert clock["explored_free"] == (known & state.visible[0] & (truth < 0.5)).sum()
 
 
 def test_a_door_closes_in_time_when_nobody_is_in_its_way():
