@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from tests import new_user
 from tests.code_blocks import Block
-from tests.new_user import StepError, User, main
+from tests.new_user import User, main
 
 
 def test_a_step_that_fails_ends_it_and_leaves_the_folder(tmp_path, monkeypatch, capsys):
@@ -49,16 +48,6 @@ def test_examples_of_packages_that_are_not_there_are_skipped(tmp_path, monkeypat
     new_user.examples(user)
     assert "there: skipped, benchmarl.run is not installed here" in capsys.readouterr().err
     assert [path.parent.name for path in tmp_path.glob("examples/*/ran")] == ["here"]
-
-
-def test_a_husk_of_the_package_is_named(tmp_path):
-    user = User(tmp_path, borrow=True, training_s=1.0)
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(user.environment)], check=True)
-    user.check_gone()
-    folders = user.call([user.python, "-c", "import site; print(site.getsitepackages()[0])"])
-    (Path(folders.strip()) / "entropy_explore_env").mkdir()
-    with pytest.raises(StepError, match="is still there"):
-        user.check_gone()
 
 
 @pytest.mark.long

@@ -45,13 +45,6 @@ def test_bad_arguments_are_one_line_and_leave_nothing(words, named, tmp_path, ca
     assert not (tmp_path / "run").exists()
 
 
-def test_a_folder_that_cannot_be_made(tmp_path, capsys):
-    (tmp_path / "file").touch()
-    assert run_command(main, ["--out", str(tmp_path / "file" / "run")]) == 2
-    said = capsys.readouterr().err
-    assert "a folder that can be made" in said and said.count("\n") == 1
-
-
 class Quiet:
     """Stands in for Ray where nothing is trained."""
 
@@ -173,17 +166,6 @@ def test_a_full_disk_keeps_the_last_checkpoint(tmp_path):
     assert kept is not None and (kept / "iteration").read_text() == "2"
     iterate(args_for(tmp_path, 400), Scripted([0.1] * 4), iteration=2)  # despite what was left unfinished
     assert last_checkpoint(tmp_path) == tmp_path / "checkpoint-000006"
-
-
-def test_the_first_iteration_leaves_a_checkpoint(tmp_path):
-    with pytest.raises(NotFiniteError):
-        iterate(args_for(tmp_path, 900), Scripted([0.1, math.nan]), iteration=0)
-    assert last_checkpoint(tmp_path) == tmp_path / "checkpoint-000001"
-
-
-def test_an_interrupted_run_ends_with_a_checkpoint(tmp_path):
-    assert not iterate(args_for(tmp_path, 900), Scripted([0.1] * 9), iteration=6, asked=True)
-    assert last_checkpoint(tmp_path) == tmp_path / "checkpoint-000007"
 
 
 def test_an_interrupted_command_says_how_to_go_on(tmp_path, capsys, monkeypatch):

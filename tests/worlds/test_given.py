@@ -19,7 +19,6 @@ from entropy_explore_env.worlds.given import (
     distinct_paths,
     in_given_worlds,
     with_given_worlds,
-    world_in_turn,
 )
 from entropy_explore_env.worlds.load import load_world, save_world, world_bytes, world_from_bytes
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
@@ -79,13 +78,6 @@ def test_missions_are_dealt_worlds_by_their_seeds_and_episodes():
     missions.reset(2, 2**100)  # 2^100 = 1 mod 3
     assert [world.name for world in missions.worlds] == ["wall 6", "wall 4", "wall 4", "wall 6"]
     np.testing.assert_array_equal(missions.state.truth[1].reshape(SHAPE), WORLDS[1].occupied)
-
-
-def test_every_world_is_dealt_as_often_as_any_other():
-    for seed in (0, 41):
-        dealt = [world_in_turn(WORLDS, seed, episode).name for episode in range(6)]
-        assert sorted(dealt) == sorted([world.name for world in WORLDS] * 2)
-        assert {world_in_turn(WORLDS, seed + k, 0).name for k in range(3)} == {w.name for w in WORLDS}
 
 
 @pytest.mark.parametrize("split", ["train", "validation", "test"])
