@@ -26,7 +26,12 @@ _ROBOT = "robot_0"
 
 
 class SingleRobotEnv(gymnasium.Env[Any, Any]):
-    """A mission of one robot. Spaces and infos are those of the team's environment."""
+    """A mission of one robot. Spaces and infos are those of the team's environment.
+
+    Attributes:
+        team: The environment of a team of one: its `joint_map` and `set_world_block` are those of this
+            mission.
+    """
 
     metadata = {"render_modes": offered_modes(), "render_fps": FRAMES_PER_S}  # noqa: RUF012 - Gymnasium's form
 
@@ -51,23 +56,23 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         if not is_whole(robots, 1, 1):
             raise SettingError("robots", robots, "1; parallel_env() takes a team")
         alone: EnvironmentSettings = {**settings, "robots": 1}
-        self._team = EntropyExploreEnv(find_scenario(scenario, 1), render_mode, **alone)
-        self.missions, self.scenario = self._team.missions, self._team.scenario
+        self.team = EntropyExploreEnv(find_scenario(scenario, 1), render_mode, **alone)
+        self.missions, self.scenario = self.team.missions, self.team.scenario
         self.render_mode = render_mode
-        self.action_space = self._team.action_space(_ROBOT)
-        self.observation_space = self._team.observation_space(_ROBOT)
+        self.action_space = self.team.action_space(_ROBOT)
+        self.observation_space = self.team.observation_space(_ROBOT)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Start a mission; see `EntropyExploreEnv.reset`."""
-        observations, infos = self._team.reset(seed, named_options(options))
+        observations, infos = self.team.reset(seed, named_options(options))
         super().reset(seed=None if seed is None else int(seed))
         return observations[_ROBOT], infos[_ROBOT]
 
     def step(self, action: object) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Advance by one step; see `EntropyExploreEnv.step`."""
-        observations, rewards, terminations, truncations, infos = self._team.step({_ROBOT: action})
+        observations, rewards, terminations, truncations, infos = self.team.step({_ROBOT: action})
         return (
             observations[_ROBOT],
             rewards[_ROBOT],
@@ -86,7 +91,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
 
     def view(self) -> RobotView:
         """Return what the robot knows; strategies see this and nothing else."""
-        return self._team.view(_ROBOT)
+        return self.team.view(_ROBOT)
 
     def __repr__(self) -> str:
         """Its scenario and its voxels."""
@@ -94,8 +99,8 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
 
     def render(self) -> Any:  # noqa: ANN401 - Gymnasium's signature
         """Return the picture of this moment, (480, 640, 3) uint8 for `rgb_array`."""
-        return self._team.render()
+        return self.team.render()
 
     def close(self) -> None:
         """Close the window, if there is one."""
-        self._team.close()
+        self.team.close()

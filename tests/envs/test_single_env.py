@@ -141,3 +141,12 @@ def test_masks_are_those_of_infos_through_wrappers(kind):
 def test_continuous_actions_have_no_masks():
     with pytest.raises(SettingError, match=r"Action\.kind = 'continuous'"):
         SingleRobotEnv(BOX).action_masks()
+
+
+def test_its_team_of_one_has_the_map_and_the_world_of_the_mission() -> None:
+    env = SingleRobotEnv("box-7x11x5")
+    env.reset(seed=0)
+    env.team.set_world_block((1.0, 2.0, 0.5), (1.5, 2.5, 1.0))
+    world = env.missions.worlds[0]
+    assert world is not None and world.occupied.sum() == 1
+    assert env.team.joint_map().grid == env.scenario.grid and not env.team.joint_map().known.any()
