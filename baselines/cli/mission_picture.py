@@ -1,4 +1,4 @@
-"""The picture of a whole mission: curves over time, and the library's picture of its end, in print size."""
+"""The picture of a whole mission: the library's picture of its end, with curves in print quality."""
 
 from __future__ import annotations
 
@@ -14,10 +14,13 @@ from PIL import Image
 from baselines.cli.figures import COLOURS, DOTS_PER_INCH, STYLE, packed_png, png
 from entropy_explore_env.errors import counted
 from entropy_explore_env.reports.recording import Recorder
-from entropy_explore_env.reports.rendering import Frame, draw_frame
+from entropy_explore_env.reports.rendering import Frame, draw_frame, layout_of
 
-_WIDTH, _HEIGHT, _CURVES_HEIGHT = 1280, 960, 400
-"""Pixels of the mission's end, and height of the curves above it."""
+_WIDTH, _HEIGHT = 1110, 830
+_BESIDE, _ABOVE = 44, 16
+"""Pixels left of and above the frame's own curves that belong to them; others take their place."""
+_NARROW = 560
+"""Width in pixels up to which curves stand one above the other."""
 
 
 def mission_picture(recorder: Recorder, end: Frame, title: str, strategy: str, truth: bool = False) -> bytes:
@@ -34,20 +37,28 @@ def mission_picture(recorder: Recorder, end: Frame, title: str, strategy: str, t
         A PNG file.
     """
     missions = recorder.missions
+    what = f"{title}, {strategy}, {counted(missions.scenario.robots, 'robot')}, seed {missions.seeds[0]}"
+    end = replace(end, title=f"{what}: belief of robot_0")
+    picture = draw_frame(end, _WIDTH, _HEIGHT)
+    box = layout_of(end, _WIDTH, _HEIGHT).curves
+    left, top = box.left - _BESIDE, box.top - _ABOVE
+    picture[top:, left:] = _curves(recorder, _WIDTH - left, _HEIGHT - top)
+    pictures = [picture, draw_frame(true_world(end, recorder), _WIDTH, _HEIGHT)] if truth else [picture]
+    return packed_png(Image.fromarray(np.concatenate(pictures)))
+
+
+def _curves(recorder: Recorder, width: int, height: int) -> np.ndarray:
+    """Draw entropies and what was sent, (height, width, 3) uint8."""
     with mpl.rc_context(STYLE):
-        size = (_WIDTH / DOTS_PER_INCH, _CURVES_HEIGHT / DOTS_PER_INCH)
-        figure = Figure(figsize=size, layout="constrained")
-        left, right = figure.subplots(1, 2)
-        _draw_entropies(left, recorder)
-        sent, label, of_what = _sent(recorder)
-        right.step(recorder.series().time_s, sent, where="post", color="0.2")
-        right.set(xlabel="simulated time (s)", ylabel=label, title=f"{of_what}, cumulative")
-        what = f"{title}, {strategy}, {counted(missions.scenario.robots, 'robot')}, seed {missions.seeds[0]}"
-        figure.suptitle(what, x=0.01, ha="left", fontsize=11)
-        curves = np.asarray(Image.open(io.BytesIO(png(figure))).convert("RGB"))
-    frames = [end, true_world(end, recorder)] if truth else [end]
-    pictures = [draw_frame(frame, _WIDTH, _HEIGHT) for frame in frames]
-    return packed_png(Image.fromarray(np.concatenate([curves, *pictures])))
+        figure = Figure(figsize=(width / DOTS_PER_INCH, height / DOTS_PER_INCH), layout="constrained")
+        rows = 2 if width <= _NARROW else 1
+        first, second = figure.subplots(rows, 3 - rows).ravel()
+        _draw_entropies(first, recorder)
+        sent, label = _sent(recorder)
+        second.step(recorder.series().time_s, sent, where="post", color="0.2")
+        second.set(xlabel="time (s)", ylabel=label)
+        drawn = Image.open(io.BytesIO(png(figure))).convert("RGB").resize((width, height))
+    return np.asarray(drawn)
 
 
 def true_world(frame: Frame, recorder: Recorder) -> Frame:
@@ -65,14 +76,14 @@ def true_world(frame: Frame, recorder: Recorder) -> Frame:
     )
 
 
-def _sent(recorder: Recorder) -> tuple[np.ndarray, str, str]:
-    """(T,) what the team has sent, the axis' label and what it is; scans of a robot that is alone."""
+def _sent(recorder: Recorder) -> tuple[np.ndarray, str]:
+    """(T,) what the team has sent so far, and the axis' label; scans of a robot that is alone."""
     scenario, series = recorder.missions.scenario, recorder.series()
     if scenario.robots == 1:
-        return series.scans[:, 0], "scans", "Scans"
+        return series.scans[:, 0], "scans"
     if scenario.channel.content == "summaries":
-        return series.bits_sent / 1000, "sent by the team (kbit)", "Summaries"
-    return series.shared, "measurements sent by the team", "Shared measurements"
+        return series.bits_sent / 1000, "sent (kbit)"
+    return series.shared, "measurements sent"
 
 
 def _draw_entropies(axes: Axes, recorder: Recorder) -> None:
@@ -85,9 +96,8 @@ def _draw_entropies(axes: Axes, recorder: Recorder) -> None:
             where="post",
             color=COLOURS[robot % len(COLOURS)],
             linewidth=1.0 + 0.8 * (robots - 1 - robot),  # equal maps: all of the curves can be seen
-            label=f"robot_{robot}",
         )
     threshold = float(recorder.missions.state.missions[0]["entropy_end_bits"]) / 1000
     axes.axhline(threshold, color="0.4", linewidth=1, linestyle="--", label="threshold")
-    axes.set(xlabel="simulated time (s)", ylabel="entropy of the map (1000 bits)", title="Entropy")
-    axes.legend(frameon=False, fontsize=8)
+    axes.set(xlabel="time (s)", ylabel="entropy (kbit)")
+    axes.legend(frameon=False, fontsize=8, handlelength=1.2)

@@ -28,7 +28,7 @@ from entropy_explore_env.reports.annotations import (
     write,
 )
 from entropy_explore_env.reports.colours import COLOURS, INK, UNKNOWN_LEVEL, robot_colour
-from entropy_explore_env.reports.page_layout import HEADER, MARGIN, View, lay_out
+from entropy_explore_env.reports.page_layout import HEADER, MARGIN, PageLayout, View, lay_out
 from entropy_explore_env.reports.projection import Projection, projections
 
 _TITLE_SIZE = 20
@@ -146,10 +146,7 @@ def draw_frame(frame: Frame, width: int = 640, height: int = 480) -> np.ndarray:
     for name, value, least in (("width", width, _LEAST_WIDTH), ("height", height, _LEAST_HEIGHT)):
         if value < least:
             raise SettingError(name, value, f"at least {least} pixels")
-    status = frame.status[:_STATUS_LINES]
-    shape, robots = np.shape(frame.entropy_share), len(frame.positions_m)
-    page_size, lines = (width, height), len(status)
-    layout = lay_out(shape, float(frame.voxel_size_m), robots, frame.marks, lines, *page_size, frame.kinds)
+    status, layout = frame.status[:_STATUS_LINES], layout_of(frame, width, height)
     page, unit = layout.page.copy(), layout.unit
     draw = ImageDraw.Draw(page)
     _write_title(draw, frame.title, width - 2 * MARGIN * unit, unit)
@@ -164,6 +161,13 @@ def draw_frame(frame: Frame, width: int = 640, height: int = 480) -> np.ndarray:
         page.paste(picture, (view.left, view.top))
     _draw_curves(draw, layout.curves, frame, unit)
     return np.array(page)
+
+
+def layout_of(frame: Frame, width: int, height: int) -> PageLayout:
+    """Return where everything lies in the picture of a frame."""
+    shape, robots = np.shape(frame.entropy_share), len(frame.positions_m)
+    size, lines = (width, height), len(frame.status[:_STATUS_LINES])
+    return lay_out(shape, float(frame.voxel_size_m), robots, frame.marks, lines, *size, frame.kinds)
 
 
 def _write_title(draw: ImageDraw.ImageDraw, title: str, width: int, unit: int) -> None:
