@@ -264,9 +264,9 @@ class SuiteMission:
         if file is None:
             run_mission(env, timed, seed, options=self.options)
         else:
-            log = _CommandLog()
-            run_mission(env, timed, seed, log.note, log.command, self.options)
-            save_record(log.record(strategy), file)
+            recorder = CommandRecorder(env.missions)
+            run_mission(env, timed, seed, lambda _: recorder.note(), recorder.command, self.options)
+            save_record(recorder.record(strategy), file)
         mission_s = time.perf_counter() - started
         spent_ms = timed.decisions_ms[1:] or timed.decisions_ms
         clock = {
@@ -275,30 +275,6 @@ class SuiteMission:
             "mission_s": mission_s,
         }
         return {**suite_figures(env), "clock": rounded(clock)}
-
-
-class _CommandLog:
-    """Follows the mission of an environment for its record."""
-
-    def __init__(self) -> None:
-        self._recorder: CommandRecorder | None = None
-
-    def note(self, env: EntropyExploreEnv) -> None:
-        """Note the reset, or a step."""
-        if self._recorder is None:
-            self._recorder = CommandRecorder(env.missions)
-        else:
-            self._recorder.note()
-
-    def command(self, actions: Mapping[str, Any]) -> None:
-        """Note the actions of a step."""
-        assert self._recorder is not None
-        self._recorder.command(actions)
-
-    def record(self, strategy: str) -> MissionRecord:
-        """Return the record of the mission so far."""
-        assert self._recorder is not None
-        return self._recorder.record(strategy)
 
 
 def replay_commands(

@@ -116,7 +116,7 @@ class CommandRecorder:
     """Follows the first of some missions and makes its record."""
 
     def __init__(self, missions: Missions) -> None:
-        """Follow these missions, which have just been reset."""
+        """Follow these missions, which have just been reset, or are reset next."""
         self._missions = missions
         self._commands: list[list[np.ndarray]] = []
         self._scan_s: list[float] = []
@@ -128,13 +128,15 @@ class CommandRecorder:
         self._commands.append([np.array(actions[agent]) for agent in self._missions.scenario.agents])
 
     def note(self) -> None:
-        """Note which robots have scanned in the step that was just taken."""
-        robots, time_s = self._missions.state.robots[0], float(self._missions.state.missions[0]["time_s"])
+        """Note the reset, or which robots have scanned in the step that was just taken."""
+        robots, mission = self._missions.state.robots[0], self._missions.state.missions[0]
+        before = self._scans if mission["cycles"] else robots["scans"]
+        time_s = float(mission["time_s"])
         numbers = self._missions.rules.params
-        for robot in np.flatnonzero(robots["scans"] > self._scans):
+        for robot in np.flatnonzero(robots["scans"] > before):
             waited_s = numbers[robot]["blocked_wait_s"] if robots[robot]["waiting"] else 0.0
             ended_s = min(float(robots[robot]["ready_s"] - waited_s), time_s)  # later: it has left since
-            new = int(robots[robot]["scans"] - self._scans[robot])
+            new = int(robots[robot]["scans"] - before[robot])
             self._scan_s += [ended_s] * new
             self._scan_robot += [int(robot)] * new
         self._scans = robots["scans"].copy()

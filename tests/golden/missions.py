@@ -41,18 +41,10 @@ _OF_ROBOTS = tuple(
 def run_again(record: MissionRecord) -> tuple[MissionRecord, Missions]:
     """The same strategy in the same scenario with the same seed: its record, and the missions at its end."""
     env = EntropyExploreEnv(record.scenario)
-    recorders: list[CommandRecorder] = []
-
-    def after_step(env: EntropyExploreEnv) -> None:
-        if not recorders:
-            recorders.append(CommandRecorder(env.missions))
-        recorders[0].note()
-
-    def before_step(actions: object) -> None:
-        recorders[0].command(actions)  # type: ignore[arg-type]
-
-    run_mission(env, make_strategy(record.strategy), record.seed, after_step, before_step)
-    return recorders[0].record(record.strategy), env.missions
+    recorder = CommandRecorder(env.missions)
+    strategy = make_strategy(record.strategy)
+    run_mission(env, strategy, record.seed, lambda _: recorder.note(), recorder.command)
+    return recorder.record(record.strategy), env.missions
 
 
 def summary_of(missions: Missions) -> dict[str, np.ndarray]:
