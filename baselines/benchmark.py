@@ -28,7 +28,7 @@ from baselines.cli.options import Mark
 from baselines.cli.task_options import TaskOptions, is_whole_scenario
 from baselines.cli.worker_options import TrialOptions
 from baselines.experiments.rows import read_table
-from baselines.experiments.trials import How, run_trials
+from baselines.experiments.trials import How
 from baselines.strategies import STRATEGIES, make_strategy, resolved, shown_names
 from baselines.suites import find_suite, suite_strategies
 from baselines.suites.own import (
@@ -38,7 +38,8 @@ from baselines.suites.own import (
     scenario_tasks,
     world_tasks,
 )
-from baselines.suites.results import by_seed, results_of
+from baselines.suites.results import results_of
+from baselines.suites.running import run_suite
 from baselines.suites.suite import BASELINE, REFERENCE, Suite
 from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.settings.scenarios import SCENARIOS
@@ -121,6 +122,8 @@ def main(words: Sequence[str]) -> int:
     args = parse(Args, words, description=__doc__)
     if args.check is not None:
         return _check(args.check, args)
+    if args.entry is not None and not (args.suite and args.strategies and args.author.strip()):
+        raise SettingError("entry", str(args.entry), "--suite, --strategies and --author beside it")
     suite, refused = _suite(args, words)
     stop_after_s = math.inf if args.stop_after_s is None else args.stop_after_s
     title = "strategies" if args.suite is None else f"suite {suite.name}"
@@ -140,11 +143,7 @@ def main(words: Sequence[str]) -> int:
     started = time.monotonic()
     table = runs / f"{suite.name}.jsonl"
     if stop_after_s > 0.0:
-        ran = run_trials(suite.trials, table, how, known)
-        if suite.later is not None:
-            suite = suite.completed(by_seed(row for row in ran if row is not None))
-            left_s = max(stop_after_s - (time.monotonic() - started), 0.0)
-            run_trials(suite.trials, table, dataclasses.replace(how, stop_after_s=left_s), known)
+        run_suite(suite, table, how, known)
     whole = suite if args.suite is None else find_suite(suite.name, strategies=suite.strategies)
     results, rows = results_of(whole, [*known, *read_table(table)])
     if not rows:
@@ -169,13 +168,10 @@ def main(words: Sequence[str]) -> int:
 
 def _enter(folder: Path, suite: Suite, how: How, args: Args) -> int:
     """Write an entry."""
-    if args.suite is None or args.strategies is None or not args.author.strip():
-        raise SettingError("entry", str(folder), "--suite, --strategies and --author beside it")
     from baselines.suites.entries import write_entry
 
-    asked = tuple(dict.fromkeys(map(resolved, args.strategies.split(","))))
     make_folder("entry", folder)
-    whole = write_entry(folder, dataclasses.replace(suite, strategies=asked), args.quick, args.author, how)
+    whole = write_entry(folder, suite, args.quick, args.author, how)
     print(f"written: {folder}" if whole else f"stopped; the same command goes on with what is in {folder}")
     return 0
 
@@ -220,7 +216,8 @@ def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
                 inner, value = next(iter(value.items()))
                 name = inner if name == "world_file" else f"{name}.{inner}"
             raise SettingError(name, value, "no value beside --suite, which pins it")
-        return find_suite(args.suite, args.quick, chosen_strategies(args.strategies, args.suite)), []
+        chosen = chosen_strategies(args.strategies, args.suite, alone=args.entry is not None)
+        return find_suite(args.suite, args.quick, chosen), []
     if args.world_scenario is not None and args.world_scenario not in SCENARIOS:
         raise SettingError("world_scenario", args.world_scenario, one_of(args.world_scenario, SCENARIOS))
     strategies = chosen_strategies(args.strategies)
@@ -237,12 +234,13 @@ def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
     return Suite("own", "Scenarios of one's own", tasks, strategies), refused
 
 
-def chosen_strategies(words: str | None, suite: str | None = None) -> tuple[str, ...]:
+def chosen_strategies(words: str | None, suite: str | None = None, alone: bool = False) -> tuple[str, ...]:
     """Return strategies from names with commas between them.
 
     Args:
         words: Names; `all` = every one; None = those of the suite's table, without a suite every one.
         suite: Its name; the strategy that ratios are relative to is added, without a suite the random walk.
+        alone: Add none.
 
     Raises:
         SettingError: No strategy, or no suite, has such a name.
@@ -253,7 +251,7 @@ def chosen_strategies(words: str | None, suite: str | None = None) -> tuple[str,
         names = list(STRATEGIES) if words in (None, "all") else words.split(",")
     for name in names:
         make_strategy(name)
-    added = [] if suite == "faults" else [BASELINE if suite is None else REFERENCE]
+    added = [] if alone or suite == "faults" else [BASELINE if suite is None else REFERENCE]
     return tuple(dict.fromkeys([*added, *map(resolved, names)]))
 
 

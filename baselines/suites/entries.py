@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -19,17 +20,11 @@ from baselines.experiments.mission import SuiteMission, replay_commands, suite_f
 from baselines.experiments.origin import this_origin
 from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.rows import Record, Row, read_table, write_table
-from baselines.experiments.trials import (
-    Cell,
-    CellTrial,
-    How,
-    described_scenario,
-    environment,
-    run_trials,
-)
+from baselines.experiments.trials import Cell, CellTrial, How, described_scenario, environment
 from baselines.experiments.worker_pool import Failure, run_each
 from baselines.suites import find_suite
 from baselines.suites.results import by_seed
+from baselines.suites.running import run_suite
 from baselines.suites.suite import Suite
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import EntropyExploreError, SettingError
@@ -111,11 +106,8 @@ def write_entry(folder: Path, suite: Suite, quick: bool, author: str, how: How) 
                 raise SettingError(name, getattr(about, name), allowed)
     (folder / _MISSIONS).mkdir(parents=True, exist_ok=True)
     write_atomically(folder / ABOUT, msgspec.json.format(msgspec.json.encode(about)).decode() + "\n")
-    table, known = folder / _GROWING, read_table(folder / ROWS)
-    found = run_trials(_recorded(suite, folder), table, how, known)
-    if suite.later is not None and None not in found:
-        suite = suite.completed(by_seed(row for row in found if row is not None))
-        found = run_trials(_recorded(suite, folder), table, how)
+    table, recorded = folder / _GROWING, partial(RecordedTrial, folder=folder)
+    found = run_suite(suite, table, how, read_table(folder / ROWS), recorded)
     rows = [row for row in found if row is not None]
     if len(rows) < len(found):
         return False
@@ -123,10 +115,6 @@ def write_entry(folder: Path, suite: Suite, quick: bool, author: str, how: How) 
     for left in (table, table.with_name(f".{_GROWING}.lock"), folder / CHECK):
         left.unlink(missing_ok=True)
     return True
-
-
-def _recorded(suite: Suite, folder: Path) -> list[RecordedTrial]:
-    return [RecordedTrial(trial.point, trial.seed, folder) for trial in suite.trials]
 
 
 def read_about(folder: Path) -> About:

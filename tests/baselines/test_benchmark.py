@@ -247,6 +247,8 @@ def test_the_reference_is_always_there_and_first():
     assert chosen_strategies("gradient,random") == ("random", "gradient")
     assert set(chosen_strategies("all")) == set(chosen_strategies(None)) == set(strategies.STRATEGIES)
     assert chosen_strategies("gradient", "plans") == ("nearest-frontier", "gradient")
+    assert chosen_strategies("gradient", "plans", alone=True) == ("gradient",)
+    assert set(chosen_strategies("all", "plans", alone=True)) == set(strategies.STRATEGIES)
     assert chosen_strategies("best") == ("random", strategies.ALIASES["best"])
     assert chosen_strategies("gradient", "faults") == ("gradient",)
 
