@@ -19,7 +19,7 @@ from baselines.suites import SCOREBOARD, entries, find_suite
 from baselines.suites.faults import CONDITIONS, LOST_ISOLATED, NOTHING_FAILS, Times, all_claims
 from baselines.suites.figures import fault_figure, task_figure
 from baselines.suites.results import Results, Row, failed_rows, overall_rows, results_of, task_rows
-from baselines.suites.suite import Measure, Task
+from baselines.suites.suite import REFERENCE, Measure, Task
 from entropy_explore_env.errors import counted
 from entropy_explore_env.writing import write_atomically
 
@@ -95,17 +95,17 @@ def part_texts(results: Results, rows: Sequence[KeptRow]) -> dict[str, Any]:
 
 def overall_table(results: Results) -> str:
     """Return the table over all tasks: a row a strategy, best first."""
-    head, rows = _overall(results)
+    head, rows = _overall(results, overall_rows(results))
     return markdown_table(head, [[f"`{name}`", *cells] for name, *cells in rows])
 
 
 def cite(folder: Path, results: Results) -> None:
     """Write the table over all tasks as LaTeX and CSV, and the figure of the tasks as PDF."""
-    name, (head, rows) = results.suite.name, _overall(results)
+    name, overall = results.suite.name, overall_rows(results)
+    head, rows = _overall(results, overall)
     plain = [[str(cell).replace("…", "to") for cell in row] for row in rows]
     latex_head = [text.replace("`", "") for text in head]
     write_atomically(folder / f"{name}.tex", latex_table(latex_head, plain))
-    overall = overall_rows(results)
     columns: dict[str, Sequence[object]] = {
         key: [row[key] for row in overall] for key in ("strategy", "tasks", "missions", "finished")
     }
@@ -118,12 +118,11 @@ def cite(folder: Path, results: Results) -> None:
     task_figure(results).savefig(folder / f"{name}.pdf", metadata={"CreationDate": None})
 
 
-def _overall(results: Results) -> tuple[list[str], list[list[object]]]:
-    """Return head and rows of the table over all tasks."""
+def _overall(results: Results, overall: Sequence[Row]) -> tuple[list[str], list[list[object]]]:
+    """Return head and cells of a table over all tasks, of these rows of `overall_rows`."""
     measures = results.suite.measures
     head = ["strategy", "tasks", "missions", "finished"]
     head += [f"{measure.words}, over `{results.reference}`" for measure in measures]
-    overall = overall_rows(results)
     names = shown_names(row["strategy"] for row in overall)
     return head, [
         [
@@ -140,22 +139,23 @@ def _overall(results: Results) -> tuple[list[str], list[list[object]]]:
 def entries_table(folder: Path) -> str:
     """Return the table of the entries in a folder, one a row; empty if there are none.
 
-    Ratios are relative to the reference's missions in the archives beside that folder.
+    Ratios are relative to the reference's missions in the archives of the pages to which that folder belongs.
     """
     rows: list[list[object]] = []
     for entry in sorted(each.parent for each in folder.glob(f"*/{entries.ABOUT}")):
         about, check = entries.read_about(entry), entries.read_check(entry)
-        kept = [*read_table(folder.parent / f"{about.suite}.jsonl.xz"), *read_table(entry / entries.ROWS)]
+        archived = read_table(archive_of(folder.parents[1], about.suite))
+        kept = [row for row in archived if row.settings.get("strategy") == REFERENCE]
+        kept += read_table(entry / entries.ROWS)
         results, _ = results_of(find_suite(about.suite, about.quick, about.strategies), kept)
+        own = [row for row in overall_rows(results) if row["strategy"] in about.strategies]
         checked = "no"
         if check is not None:
             checked = f"{check.held} of {check.rows} rows" if check.held < check.rows else "yes"
-        for name, *cells in _overall(results)[1]:
-            if name in shown_names(about.strategies).values():
-                suite = f"{about.suite}, quick" if about.quick else about.suite
-                rows.append(
-                    [f"[`{name}`](scoreboard/entries/{entry.name})", about.author, suite, *cells, checked]
-                )
+        suite = f"{about.suite}, quick" if about.quick else about.suite
+        for name, *cells in _overall(results, own)[1]:
+            link = f"[`{name}`](scoreboard/entries/{entry.name})"
+            rows.append([link, about.author, suite, *cells, checked])
     head = [
         "strategy",
         "by",
