@@ -14,7 +14,6 @@ _DIGITS = 4
 """Significant digits of figures below 1000; above, whole numbers."""
 _FEW = 3
 """Figures of a paper that stand in a line of a group of claims."""
-_YES_NO = {True: "yes", False: "no"}
 COLUMNS = ("id", "claim", "paper", "ours", "low", "high", "holds")
 """Of claims as JSON and CSV."""
 SAME = "the number"
