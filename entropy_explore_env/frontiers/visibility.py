@@ -29,6 +29,7 @@ from entropy_explore_env.belief.raycast import (
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.frontiers.blocks import UNEXPLORED
+from entropy_explore_env.robots.rotations import directions_of
 from entropy_explore_env.settings.robot_kind import RobotKind
 
 _MOST_RAYS = 720
@@ -170,8 +171,5 @@ def rays_around(reach: float, pitches: np.ndarray) -> np.ndarray:
 
 def rays_towards(yaws: np.ndarray, pitches: np.ndarray) -> np.ndarray:
     """Return (…, D, 3) float64 unit vectors of all pairs of (…, N) yaws and (…, M) pitches, radians."""
-    yaw, pitch = yaws[..., :, np.newaxis], pitches[..., np.newaxis, :]
-    level = np.cos(pitch)
-    axes = np.broadcast_arrays(np.cos(yaw) * level, np.sin(yaw) * level, -np.sin(pitch))
-    rays = np.stack(axes, axis=-1)
+    rays = directions_of(yaws[..., :, np.newaxis], pitches[..., np.newaxis, :])
     return rays.reshape(*rays.shape[:-3], -1, 3)
