@@ -59,27 +59,28 @@ class PlannedRate:
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
-        weights, self._homeward = self.weights, set[int]()
-        self._frontiers = [weights is None and explores_frontiers(scenario, kind) for kind in scenario.kinds]
+        weights, kinds = self.weights, [scenario.kind_of(robot) for robot in range(scenario.robots)]
+        self._by_frontiers = [weights is None and explores_frontiers(scenario, kind) for kind in kinds]
+        """Whether each robot goes for frontier cells, and home when there are none."""
         self._returns = scenario.ending.return_to_start
-        if any(self._frontiers) or self._returns:
+        if any(self._by_frontiers) or self._returns:
             self._tours = SharedTour()
             self._tours.backs_off = False  # whatever the planner chooses is followed so
             self._tours.reset(scenario, rng)
-        if not all(self._frontiers):
+        if not all(self._by_frontiers):
             most = 1 if weights is None else weights.candidates
             proposing = with_settings(scenario, {"action": {"kind": "candidates", "candidates": most}})
             self._proposer = ViewProposer(proposing, rng)
 
     def choose(self, view: RobotView) -> np.ndarray:
         """Return the viewpoint (5,) by the robot's own belief and what it has heard."""
-        if self._goes_by_frontiers(view.robot):
+        if self._by_frontiers[view.robot]:
             return self._tours.choose(view)
         proposed = self._proposer.propose(view)
-        if self._returns and view.ceiling is None:
+        if self._returns and view.ceiling is None:  # below an exposure surface there are no tours
             self._tours.start_from(view)
             if self._proposer.found_nothing(view.robot):
-                self._homeward.add(view.robot)
+                self._by_frontiers[view.robot] = True
                 return self._tours.choose(view)
         if self.weights is None:
             return proposed[0].copy()
@@ -89,9 +90,6 @@ class PlannedRate:
 
     def found_nothing(self, robot: int) -> bool:
         """Return whether nothing that is worth a drive was found for a robot at its latest decision."""
-        if self._goes_by_frontiers(robot):
+        if self._by_frontiers[robot]:
             return self._tours.found_nothing(robot)
         return self._proposer.found_nothing(robot)
-
-    def _goes_by_frontiers(self, robot: int) -> bool:
-        return self._frontiers[robot % len(self._frontiers)] or robot in self._homeward
