@@ -242,17 +242,10 @@ class BagReader:
         if not poses:
             return None
         frame = frames.to(self._map_frame, message.header.frame_id)
-        if kind == _GRID:
-            grid = grid_of_message(message)
-            corner = np.array([*grid.origin[:2], grid.bottom_m, grid.origin[2], 0.0])
+        if kind in (_GRID, _TREE):
+            percent, corner, edge_m = _map_of(message, kind)
             origin, bottom_m = in_map_frame(corner, frame)
-            return MapHeard(time_s, grid.grid, origin, bottom_m, grid.resolution_m, poses)
-        if kind == _TREE:
-            labels, low = voxels_of_tree(np.asarray(message.data).tobytes(), bool(message.binary))
-            edge_m = float(message.resolution)
-            corner = np.array([*(np.asarray(low, np.float64) * edge_m), 0.0, 0.0])
-            origin, bottom_m = in_map_frame(corner, frame)
-            return MapHeard(time_s, percent_of(labels), origin, bottom_m, edge_m, poses)
+            return MapHeard(time_s, percent, origin, bottom_m, edge_m, poses)
         if frame is None:
             return None
         points = points_of_cloud(message) @ frame[:3, :3].T + frame[:3, 3]
@@ -260,21 +253,33 @@ class BagReader:
         return ScanHeard(time_s, robot, pose_of_matrix(frame), points, poses)
 
 
-def in_map_frame(corner: np.ndarray, frame: np.ndarray | None) -> tuple[tuple[float, float, float], float]:
-    """Return ((x, y, yaw), z) in the map frame of a grid's corner (x, y, z, yaw, pitch) in its own frame.
+def _map_of(message: Any, kind: str) -> tuple[np.ndarray, np.ndarray, float]:  # noqa: ANN401
+    """Return the percents of a map, the pose (5,) of its corner in its frame, and the edge of its voxels."""
+    if kind == _GRID:
+        grid = grid_of_message(message)
+        x, y, yaw = grid.origin
+        return grid.grid, np.array([x, y, grid.bottom_m, yaw, 0.0]), grid.resolution_m
+    labels, low = voxels_of_tree(np.asarray(message.data).tobytes(), bool(message.binary))
+    edge_m = float(message.resolution)
+    return percent_of(labels), np.array([*(low * edge_m), 0.0, 0.0]), edge_m
 
-    A frame of which no transform was heard, None, counts as the map frame.
+
+def in_map_frame(corner: np.ndarray, frame: np.ndarray | None) -> tuple[tuple[float, float, float], float]:
+    """Return ((x, y, yaw), z) of a level grid's corner in the map frame.
+
+    Args:
+        corner: (5,) its pose in the frame of the grid.
+        frame: (4, 4) from that frame to the map frame; None = no transform was heard, and they are the same.
 
     Raises:
-        SettingError: The frame does not lie level.
+        SettingError: The frame of the grid is not level.
     """
     if frame is None:
         frame = np.eye(4)
-    yaw_rad = float(corner[3]) + gaze_of(frame[:3, :3])[0]
     if frame[2, 2] < _LEVEL:
         raise SettingError("frame of the map", frame[:3, :3].tolist(), "one that lies level in the map frame")
     x, y, z = (float(v) for v in frame[:3, :3] @ corner[:3] + frame[:3, 3])
-    return (x, y, yaw_rad), z
+    return (x, y, float(corner[3]) + gaze_of(frame)[0]), z
 
 
 def world_of_bag(path: Path | str, topic: str | None = None) -> World:

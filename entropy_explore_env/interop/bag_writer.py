@@ -85,6 +85,7 @@ class BagWriter:
         self._scans, self._departed_s = np.zeros(robots, np.int64), np.full(robots, -1.0)
         edge_m, corner_m = missions.grid.voxel_size_m, np.asarray(missions.grid.origin_m)
         self._octomap_m = corner_m - np.rint(corner_m / edge_m) * edge_m
+        """(3,) origin of the frame `octomap` in the map frame, at most half a voxel edge along each axis."""
 
     def __enter__(self) -> BagWriter:
         return self
