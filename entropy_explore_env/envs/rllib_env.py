@@ -101,8 +101,8 @@ class EntropyExploreMultiAgentEnv(MultiAgentEnv):
             action_dict: An action for every robot that decides, and for no other.
 
         Returns:
-            Observations, rewards and infos of the robots that decide next, at the end of all; who
-            terminated and who was truncated, in the form of `endings`.
+            Observations, rewards and infos of the robots that decide next, at the end of all; which
+            of them terminated and which were truncated, in the form of `endings`.
 
         Raises:
             CallOrderError: There was no reset, or the mission is over.

@@ -29,8 +29,8 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
     """A mission of one robot. Spaces and infos are those of the team's environment.
 
     Attributes:
-        team: The environment of a team of one: its `joint_map` and `set_world_block` are those of this
-            mission.
+        team: The team of one as an `EntropyExploreEnv`, with all that this class does not repeat, such as
+            `joint_map` and `set_world_block`.
     """
 
     metadata = {"render_modes": offered_modes(), "render_fps": FRAMES_PER_S}  # noqa: RUF012 - Gymnasium's form
@@ -46,7 +46,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         Args:
             scenario: A scenario's name, or a Scenario; its team size is set to 1.
             render_mode: None, "human" or "rgb_array".
-            **settings: As of `EntropyExploreEnv`.
+            **settings: As for `EntropyExploreEnv`.
 
         Raises:
             SettingError: A setting is unknown or out of its range, or `robots` is not 1.
@@ -66,7 +66,8 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Start a mission; see `EntropyExploreEnv.reset`."""
-        observations, infos = self.team.reset(seed, named_options(options))
+        known = named_options(options)  # the team lets pass what PettingZoo's checkers send
+        observations, infos = self.team.reset(seed, known)
         super().reset(seed=None if seed is None else int(seed))
         return observations[_ROBOT], infos[_ROBOT]
 

@@ -1,4 +1,4 @@
-"""What an Explorer is asked with, poses, and what it answers: a goal, or why there is none."""
+"""Answers of an Explorer, a goal or the reason why there is none, and checks of poses that it is given."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Maps as files of other programs: map_server's, OctoMap's, PLY and NumPy's.
 
-| suffix | what is written | who reads it |
+| suffix | what is written | what reads it |
 | --- | --- | --- |
 | `.yaml`, `.pgm` | both files: an image of a layer, and where it lies | ROS's map_server |
 | `.bt`, `.ot` | which voxels are free, solid or unknown | OctoMap |

@@ -112,6 +112,7 @@ class Recorder:
         """Follow these missions; nothing is recorded yet."""
         self.missions = missions
         self._moments: list[Series] = []
+        """Each of a single moment, without the axis of T."""
 
     def note(self) -> None:
         """Record this moment, after a reset or a step."""

@@ -11,7 +11,7 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import FROM_WORLD
 
 _LATER = "backlog_"
-"""Empty arrays of such names are left out, so that records from before them keep their digests."""
+"""Empty arrays whose names begin so are left out: older records, which lack them, keep their digests."""
 
 
 def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:

@@ -8,7 +8,7 @@ from typing import Literal
 from entropy_explore_env.settings.validation import check_choice, check_count
 
 MAX_CANDIDATES = 64
-"""Viewpoints that a robot can be proposed: who sees a voxel is noted in the bits of a 64-bit number."""
+"""Most viewpoints that are proposed to a robot: 64 bits of a number note which of them see a voxel."""
 
 
 @dataclass(frozen=True)

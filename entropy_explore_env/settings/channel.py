@@ -11,7 +11,7 @@ from entropy_explore_env.settings.validation import check, check_choice, check_c
 
 BITS_PER_MEASUREMENT = 96
 BITS_PER_RECEIPT = 48
-"""In each message for each teammate, where robots send by need."""
+"""Bits for each teammate in each message, where robots send by need."""
 
 
 @dataclass(frozen=True)
@@ -49,9 +49,9 @@ class Channel:
     """What robots tell each other: the most useful measurements of a scan (Rocha04, eqs. 42-43), or maps.
 
     A batch is sent at once (Rocha04) or, with `phase_s`, broadcast in phases (Bhattacharya 2010, sect. 5.3):
-    a phase's batches wait for its end, are repeated all through the next phase, and who has them already
-    ignores them. Either way `burst` and `i_min_bits` select what is in a batch: as many as there are rays,
-    and 0, send everything that was newly measured.
+    a phase's batches wait for its end and are repeated all through the next phase; robots that have them
+    already ignore them. Either way `burst` and `i_min_bits` select what is in a batch: as many as there are
+    rays, and 0, send everything that was newly measured.
 
     With `content = "summaries"` robots send no batches. At the end of a scan, if `summary_every_s` have
     passed since it last did so, a robot sends a quadtree of all that it measured itself since then (Sujan,
@@ -79,8 +79,8 @@ class Channel:
         delay_s: Time from sending to hearing, 0 to 3600.
         announcements: Whether robots announce the viewpoints that they choose.
         order: Which measurements a robot sends first: `utility`, the most useful ones of its latest scan
-            (Rocha04, eq. 43); `need`, those of its latest scans that bring most to teammates which lack them,
-            as far as it knows by the receipts that all messages carry then (missions/need.py).
+            (Rocha04, eq. 43); `need`, those of its latest scans that bring most to the teammates that lack
+            them, as far as it knows from the receipts that messages then carry (missions/need.py).
         phase_s: Length of a phase of the broadcast, 1e-3 to 3600; 0 = batches are sent at once.
         repeats: How often a phase's batches are sent in the next phase, evenly spread over it; 1e-3 s apart
             or more. 1 where batches are sent at once.

@@ -1,9 +1,9 @@
 """The recipes by name.
 
-A recipe takes the workspace and a generator, and draws all that varies of a world from that. It raises a
-WorldError where the grid is flat, too small or too coarse for it. Where its docstring does not say otherwise,
-all free space is connected in which a body of 0.3 m radius fits, and in 3-D everything is as high as the
-workspace.
+A recipe takes the workspace and a generator, from which it draws all that varies between its worlds. It
+raises a WorldError where the grid is flat, too small or too coarse for it. Unless its docstring says
+otherwise, all free space in which a body of 0.3 m radius fits is connected, and in 3-D everything is as high
+as the workspace.
 """
 
 from __future__ import annotations

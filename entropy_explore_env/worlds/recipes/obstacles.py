@@ -125,8 +125,7 @@ def cluttered_plan(
 def occlusions(grid: Grid, rng: np.random.Generator) -> World:
     """Convex occlusions on a plane; they are as high as the workspace where it is 3-D.
 
-    Robots start anywhere in it; the
-    paper's start, the middle, is always free.
+    Robots start anywhere in it; the paper's start, the middle, is always free.
     """
     require_size(grid, "occlusions of up to 16 m", 40.0, 40.0)
     offsets = [np.arange(n) + 0.5 - 0.5 * n for n in grid.shape[:2]]

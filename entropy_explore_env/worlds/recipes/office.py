@@ -34,8 +34,7 @@ _AREA_A_PIECE_M2 = 5.0
 def office(grid: Grid, rng: np.random.Generator) -> World:
     """Rooms along corridors; cross corridors join the corridors where there are several.
 
-    2-D offices are bare; in 3-D ones
-    desks, cupboards, shelves and tables stand in the rooms.
+    2-D offices are bare; in 3-D ones desks, cupboards, shelves and tables stand in the rooms.
     """
     require_size(grid, "an office", *_LEAST_M)
     plan = office_plan((grid.shape[0], grid.shape[1]), grid.voxel_size_m, rng)
