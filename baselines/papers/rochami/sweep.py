@@ -17,13 +17,6 @@ TEAMS = tuple(range(2, 11))
 FEW = (2, 4, 8)
 """Team sizes with one thing changed at a time."""
 QUICK_KAPPAS = (0.25, 1.0)
-KAPPAS = (0.25, 1.0)
-KAPPA_CHANGES: dict[str, tuple[str, dict[str, Any], dict[str, Any]]] = {
-    "entropy": ("a voxel counts as known at σ = 0.03 instead of 0.2", {}, {"known_sigma": 0.03}),
-    "reach": ("candidates at most 1 m away", {"robot": {"reach_m": 1.0}}, {}),
-    "bodies": ("bodies off", {"robot": {"body_radius_m": 0.0}}, {"teammates_block": False}),
-}
-"""What is changed under κ = 0, ¼ and 1: a text, settings of the scenario, fields of the strategy's config."""
 KAPPAS = (0.0, 0.0625, 0.125, 0.25, 0.375, 0.5, 0.75, 1.0)
 COVERED = (4, 8)
 """Team sizes of which H(T) and I are followed."""
