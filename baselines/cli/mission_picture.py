@@ -17,8 +17,6 @@ from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.reports.rendering import Frame, draw_frame, layout_of
 
 _WIDTH, _HEIGHT = 1110, 830
-_BESIDE, _ABOVE = 44, 16
-"""Pixels left of and above the frame's own curves that belong to them; others take their place."""
 _NARROW = 560
 """Width in pixels up to which curves stand one above the other."""
 
@@ -40,9 +38,8 @@ def mission_picture(recorder: Recorder, end: Frame, title: str, strategy: str, t
     what = f"{title}, {strategy}, {counted(missions.scenario.robots, 'robot')}, seed {missions.seeds[0]}"
     end = replace(end, title=f"{what}: belief of robot_0")
     picture = draw_frame(end, _WIDTH, _HEIGHT)
-    box = layout_of(end, _WIDTH, _HEIGHT).curves
-    left, top = box.left - _BESIDE, box.top - _ABOVE
-    picture[top:, left:] = _curves(recorder, _WIDTH - left, _HEIGHT - top)
+    room = layout_of(end, _WIDTH, _HEIGHT).room
+    picture[room.top :, room.left :] = _curves(recorder, _WIDTH - room.left, _HEIGHT - room.top)
     pictures = [picture, draw_frame(true_world(end, recorder), _WIDTH, _HEIGHT)] if truth else [picture]
     return packed_png(Image.fromarray(np.concatenate(pictures)))
 
@@ -100,4 +97,5 @@ def _draw_entropies(axes: Axes, recorder: Recorder) -> None:
     threshold = float(recorder.missions.state.missions[0]["entropy_end_bits"]) / 1000
     axes.axhline(threshold, color="0.4", linewidth=1, linestyle="--", label="threshold")
     axes.set(xlabel="time (s)", ylabel="entropy (kbit)")
-    axes.legend(frameon=False, fontsize=8, handlelength=1.2)
+    small = {"handlelength": 1.2, "handletextpad": 0.4, "borderpad": 0.0}
+    axes.legend(loc="upper right", frameon=False, fontsize=8, **small)  # entropy falls: no curve is there

@@ -71,6 +71,7 @@ class PageLayout:
         unit: Size of the picture's details, in pixels.
         views: The maps.
         curves: The axes of the entropy curves.
+        room: What is there for the curves, with the labels of their axes.
         status: Where the status lines go.
         page: All that does not change from frame to frame; to be copied, not changed.
     """
@@ -78,6 +79,7 @@ class PageLayout:
     unit: int
     views: tuple[View, ...]
     curves: Box
+    room: Box
     status: Box
     page: Image.Image
 
@@ -129,7 +131,8 @@ def lay_out(
         for columns_and_panel in ((2, 0), (2, below), (1, below))
     ]
     best = max(choices, key=lambda choice: choice.scale)
-    status, legend, curves = _panel_boxes(best.panel, named, lines, unit)
+    status, legend, room = _panel_boxes(best.panel, named, lines, unit)
+    curves = _axes_within(room, unit)
     page = Image.new("RGB", (width, height), PAPER)
     draw = ImageDraw.Draw(page)
     for view in best.views:
@@ -140,7 +143,7 @@ def lay_out(
         draw_key(page, quantity, lowest, unit, best.scale / voxel_size_m if quantity == "entropy" else None)
     draw_legend(draw, legend, robots, marks, unit, kinds)
     draw_axes(draw, curves, unit)
-    return PageLayout(unit, best.views, curves, status, page)
+    return PageLayout(unit, best.views, curves, room, status, page)
 
 
 def _arranged(
@@ -193,7 +196,7 @@ def _arranged(
 
 
 def _panel_boxes(panel: Box, named: int, lines: int, unit: int) -> tuple[Box, Box, Box]:
-    """Status, legend of this many lines and the axes of the curves within the side panel."""
+    """Status, legend of this many lines and what is left for the curves within the side panel."""
     narrow = panel.width < 1.6 * panel.height
     column = panel.width if narrow else _SIDE * unit
     status = Box(panel.left, panel.top, column, lines * LINE_HEIGHT * unit)
@@ -202,7 +205,12 @@ def _panel_boxes(panel: Box, named: int, lines: int, unit: int) -> tuple[Box, Bo
     left, top = panel.left, legend.bottom + 2 * _GAP * unit
     if not narrow:
         left, top = panel.left + column + 2 * _GAP * unit, panel.top
+    return status, legend, Box(left, top, panel.right - left, panel.bottom - top)
+
+
+def _axes_within(room: Box, unit: int) -> Box:
+    """Return the axes of the curves, with their labels around them in what is there for the curves."""
     inset = round(text_width("100 %", TEXT_SIZE * unit)) + 5 * unit
-    width = panel.right - left - inset
-    height = panel.bottom - top - 2 * LINE_HEIGHT * unit
-    return status, legend, Box(left + inset, top + LINE_HEIGHT * unit, width, min(height, 2 * width))
+    width = room.width - inset
+    height = room.height - 2 * LINE_HEIGHT * unit
+    return Box(room.left + inset, room.top + LINE_HEIGHT * unit, width, min(height, 2 * width))

@@ -49,7 +49,7 @@ def test_the_true_world_stands_below_the_end():
     for truth in (False, True):
         picture = mission_picture(*recorded(started(free_box(robots=2, grid=GRID))), "box", "random", truth)
         sizes.append(Image.open(io.BytesIO(picture)).size)
-    assert sizes == [(1280, 400 + 960), (1280, 400 + 2 * 960)]
+    assert sizes == [(1110, 830), (1110, 2 * 830)]
 
 
 @pytest.mark.parametrize(
