@@ -51,6 +51,7 @@ from entropy_explore_env.settings.channel import BITS_PER_MEASUREMENT, BITS_PER_
 
 _OUT_OF_RANGE, _LOST = Delivery.OUT_OF_RANGE.code, Delivery.LOST.code
 _ANNOUNCEMENT = np.int64(-1)
+ONE_MESSAGE = np.int64(1)
 """In place of a number of measurements. A NumPy integer, so that callees compile for one type."""
 
 
@@ -137,6 +138,16 @@ def note_message(robot, heard, position, sent_s, count, bits):
 
 
 @lean_kernel
+def note_recipients(team, recipients, sender, pose, sent_s, time_s, count, bits):
+    """Count a message with recipients (A,), reduced to those that take it in; note where its sender was."""
+    for mate in range(len(team.robots)):
+        if recipients[mate]:
+            recipients[mate] = takes_in(team.faults, team.robots[mate], mate, time_s, bits)
+        if recipients[mate]:
+            note_message(team.robots[mate], team.heard[mate, sender], pose, sent_s, count, bits)
+
+
+@lean_kernel
 def write_announcement(robot, announced):
     """Fill (7,): the viewpoint that a robot chose, and r̂ and α̂ of its latest scan."""
     copy_numbers(robot.target, announced, 5)
@@ -165,11 +176,12 @@ def receipt_bits(team):
 
 
 @lean_kernel
-def transmit(team, index, place, time_s, recipients):
-    """Draw whom a broadcast reaches, and count whom it does not; returns whether it reaches anybody.
+def transmit(team, index, place, time_s, messages, recipients):
+    """Draw which teammates a broadcast reaches, and count those it does not; returns whether it reaches any.
 
     Args:
-        place: (x, y, z), where it sends from.
+        place: (x, y, z), where it is sent from.
+        messages: How many messages it holds, as NumPy's integer, so that this compiles for one type.
         recipients: (A,) bool, filled in.
     """
     robot, shared, heard = team.robots[index], team.params[0], False
@@ -185,11 +197,11 @@ def transmit(team, index, place, time_s, recipients):
         if code != _OUT_OF_RANGE and not passes(team.air, team, mate, place, time_s):
             code = _OUT_OF_RANGE
         if silent:
-            count_silenced(team.faults, index, 1)
+            count_silenced(team.faults, index, messages)
         elif code == _LOST:
-            robot.messages_lost += 1
+            robot.messages_lost += messages
         elif code == _OUT_OF_RANGE:
-            robot.messages_out_of_range += 1
+            robot.messages_out_of_range += messages
         else:
             recipients[mate] = heard = True
     return heard
@@ -200,7 +212,7 @@ def passes(air, team, mate, place, time_s):
     """Whether walls, and the distance, let a message through to a teammate.
 
     Args:
-        mate: Who is to hear it.
+        mate: The teammate that is to hear it.
         place: (x, y, z), where it is sent from.
     """
     if air is None:  # known while compiling: nothing of the rest is compiled
@@ -288,7 +300,7 @@ def send_batch(team, maps, clock, in_flight, scan, index, count, recipients):
     delay_s = team.params[0].delay_s + draw_lateness(team.faults, index)
     time_s, bits = clock.time_s, message_bits(team.localization, count)
     count_sent(robot, count, bits)
-    reached = transmit(team, index, point(robot.scan_pose), clock.time_s, recipients)
+    reached = transmit(team, index, point(robot.scan_pose), time_s, ONE_MESSAGE, recipients)
     if reached and delay_s > 0.0:
         slot = enqueue(clock, team, in_flight, index, count, recipients, delay_s)
         if slot >= 0:
@@ -311,7 +323,7 @@ def announce(team, clock, in_flight, index, recipients):
     bits = message_bits(team.localization, _ANNOUNCEMENT) + receipt_bits(team)
     count_sent(robot, _ANNOUNCEMENT, bits)
     delay_s = shared.delay_s + draw_lateness(team.faults, index)
-    reached = transmit(team, index, point(robot.origin), clock.time_s, recipients)
+    reached = transmit(team, index, point(robot.origin), time_s, ONE_MESSAGE, recipients)
     if reached and delay_s > 0.0:
         enqueue(clock, team, in_flight, index, _ANNOUNCEMENT, recipients, delay_s)
         return

@@ -6,22 +6,22 @@ the bits of a burst. A measurement is worth
     value = I · (share of the teammates that lack it)
 
 with I the bits that it brought to the robot's own map (Rocha04, eq. 27). Receipts in its teammates' messages
-tell the robot who has it. So what was never sent counts in full, what was lost is sent again, and no loss
-rate need be known. A teammate fuses each measurement once.
+tell the robot which of them have it. So what was never sent counts in full, what was lost is sent again, and
+no loss rate need be known. A teammate fuses each measurement once.
 """
 
 from __future__ import annotations
 
 from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.missions.faults import takes_in
 from entropy_explore_env.missions.localization import believed_scan_pose, note_covariance, weigh_batch
 from entropy_explore_env.missions.messages import (
+    ONE_MESSAGE,
     Tracer,
     count_sent,
     hear_batch,
     message_bits,
-    note_message,
+    note_recipients,
     pack_measurements,
     receipt_bits,
     transmit,
@@ -60,12 +60,8 @@ def share_by_need(backlog, mission, scan, sensor, index, recipients):
     if count == 0:
         return True
     count_sent(robot, count, bits)
-    transmit(team, index, point(robot.scan_pose), time_s, recipients)
-    for mate in range(len(team.robots)):
-        if recipients[mate]:
-            recipients[mate] = takes_in(team.faults, team.robots[mate], mate, time_s, bits)
-        if recipients[mate]:
-            note_message(team.robots[mate], team.heard[mate, index], here, time_s, count, bits)
+    transmit(team, index, point(robot.scan_pose), time_s, ONE_MESSAGE, recipients)
+    note_recipients(team, recipients, index, here, time_s, time_s, count, bits)
     tracer = Tracer(sensor.params, mission.truth)
     for age in range(min(robot.scans, len(backlog.selection.counts))):
         if backlog.selection.counts[age] > 0:

@@ -12,12 +12,7 @@ import math
 
 from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import ASSERTING, lean_kernel
-from entropy_explore_env.missions.faults import (
-    count_silenced,
-    radio_silent,
-    switched_off,
-    takes_in,
-)
+from entropy_explore_env.missions.faults import switched_off, takes_in
 from entropy_explore_env.missions.localization import (
     believed_pose,
     believed_scan_pose,
@@ -31,13 +26,11 @@ from entropy_explore_env.missions.messages import (
     message_bits,
     note_message,
     pack_measurements,
-    passes,
+    transmit,
     unpack_measurements,
 )
-from entropy_explore_env.missions.poses import copy_numbers, distance_between, pose_at
-from entropy_explore_env.robots.channel import Delivery, draw_delivery
+from entropy_explore_env.missions.poses import copy_numbers, pose_at
 
-_OUT_OF_RANGE, _LOST = Delivery.OUT_OF_RANGE.code, Delivery.LOST.code
 _MISSING, _HAS_IT, _AGAIN, _NOW = 0, 1, 2, 3
 """What a teammate has of a broadcast: nothing; all; all, and hears it again; nothing, but hears it now."""
 
@@ -88,7 +81,7 @@ def weigh_collected(localization, voxel_size_m, buffers, index, side, place, sca
 
 
 @lean_kernel
-def broadcast_all(team, maps, buffers, phases, time_s, tracer, scan):
+def broadcast_all(team, maps, buffers, phases, time_s, tracer, scan, recipients):
     """All robots broadcast, by number; where a phase ends their buffers change places before."""
     repeats, robots = team.params[0].repeats, len(team.robots)
     if phases.broadcasts % repeats == repeats - 1:
@@ -101,11 +94,11 @@ def broadcast_all(team, maps, buffers, phases, time_s, tracer, scan):
     side = 1 - phases.collecting
     for robot in range(robots):
         if buffers.counts[robot, side] > 0 and not switched_off(team.faults, robot, time_s):
-            broadcast(team, maps, buffers, side, robot, time_s, tracer, scan)
+            broadcast(team, maps, buffers, side, robot, time_s, tracer, scan, recipients)
 
 
 @lean_kernel
-def broadcast(team, maps, buffers, side, index, time_s, tracer, scan):
+def broadcast(team, maps, buffers, side, index, time_s, tracer, scan, recipients):
     """Send a robot's buffer; teammates that do not have it yet fuse it.
 
     Args:
@@ -115,23 +108,10 @@ def broadcast(team, maps, buffers, side, index, time_s, tracer, scan):
     batches, heard = buffers.counts[index, side], buffers.heard[index]
     here = pose_at(params[index], robot, time_s)
     said = believed_pose(estimate_of(team.localization, index), params[index], here)
-    silent = radio_silent(team.faults, index, time_s)
     bits = buffer_bits(team.localization, buffers.batches[index, side], batches)
+    transmit(team, index, point(here), time_s, batches, recipients)
     for mate in range(len(robots)):
-        if mate == index:
-            continue
-        apart_m = distance_between(point(here), point(pose_at(params[mate], robots[mate], time_s)))
-        shared = params[0]
-        code = draw_delivery(apart_m, shared.channel_range_m, shared.loss_probability, robot.channel_rng)
-        if code != _OUT_OF_RANGE and not passes(team.air, team, mate, point(here), time_s):
-            code = _OUT_OF_RANGE
-        if silent:
-            count_silenced(team.faults, index, batches)
-        elif code == _LOST:
-            robot.messages_lost += batches
-        elif code == _OUT_OF_RANGE:
-            robot.messages_out_of_range += batches
-        elif takes_in(team.faults, robots[mate], mate, time_s, bits):
+        if recipients[mate] and takes_in(team.faults, robots[mate], mate, time_s, bits):
             heard[mate] = _AGAIN if heard[mate] == _HAS_IT else _NOW
     for place in range(batches):
         batch = buffers.batches[index, side, place]

@@ -20,9 +20,9 @@ from entropy_explore_env.belief.map_update import ROW_FOLD_BELOW, fuse_row
 from entropy_explore_env.belief.pooling import Pool, pool_row
 from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.missions.faults import draw_lateness, takes_in
+from entropy_explore_env.missions.faults import draw_lateness
 from entropy_explore_env.missions.localization import believed_scan_pose, covariance_bits
-from entropy_explore_env.missions.messages import count_sent, enqueue, note_message, transmit
+from entropy_explore_env.missions.messages import ONE_MESSAGE, count_sent, enqueue, note_recipients, transmit
 from entropy_explore_env.missions.own_maps import forget_measured
 from entropy_explore_env.missions.poses import copy_numbers, grid_size
 from entropy_explore_env.robots.channel import BITS_PER_BATCH
@@ -73,7 +73,7 @@ def send_summary(summaries, team, maps, clock, in_flight, index, length, recipie
     delay_s = team.params[0].delay_s + draw_lateness(team.faults, index)
     bits = summary_bits(team.localization, length)
     count_sent(robot, _NO_MEASUREMENTS, bits)
-    if not transmit(team, index, point(robot.scan_pose), time_s, recipients):
+    if not transmit(team, index, point(robot.scan_pose), time_s, ONE_MESSAGE, recipients):
         return
     if delay_s > 0.0:
         slot = enqueue(clock, team, in_flight, index, _NO_MEASUREMENTS, recipients, delay_s)
@@ -82,18 +82,8 @@ def send_summary(summaries, team, maps, clock, in_flight, index, length, recipie
         return
     here = believed_scan_pose(team.localization, robot, index)
     most = latest_precision(team.localization, index, team.params[0].voxel_size_m)
-    note_summary(team, recipients, index, here, time_s, time_s, bits)
+    note_recipients(team, recipients, index, here, time_s, time_s, _NO_MEASUREMENTS, bits)
     hear_summary(summaries.tree, team, maps, recipients, length, most)
-
-
-@lean_kernel
-def note_summary(team, recipients, sender, pose, sent_s, time_s, bits):
-    """Count a summary with recipients (A,), reduced to those that take it in; note where its sender was."""
-    for mate in range(len(team.robots)):
-        if recipients[mate]:
-            recipients[mate] = takes_in(team.faults, team.robots[mate], mate, time_s, bits)
-        if recipients[mate]:
-            note_message(team.robots[mate], team.heard[mate, sender], pose, sent_s, _NO_MEASUREMENTS, bits)
 
 
 @lean_kernel
@@ -133,7 +123,8 @@ def receive_summary(summaries, team, maps, in_flight, slot):
     copy_numbers(summaries.contents[parcel.place], summaries.tree.coder.data, length)
     most = sent_precision(team.localization, in_flight.covariances, slot, team.params[0].voxel_size_m)
     recipients = in_flight.recipients[slot]
-    note_summary(team, recipients, sender, message.pose, message.sent_s, time_s, bits)
+    pose, sent_s = message.pose, message.sent_s
+    note_recipients(team, recipients, sender, pose, sent_s, time_s, _NO_MEASUREMENTS, bits)
     hear_summary(summaries.tree, team, maps, recipients, length, most)
     return True
 

@@ -182,7 +182,8 @@ def advance(mission, sensors, work):
             if not receive_summary(team.summaries, team, maps, mission.in_flight, event.number):
                 receive(team, maps, mission.in_flight, event.number, tracer, scan)
         elif event.kind == BROADCAST_DUE:
-            broadcast_all(team, maps, mission.buffers, mission.phases, clock.time_s, tracer, scan)
+            buffers, phases = mission.buffers, mission.phases
+            broadcast_all(team, maps, buffers, phases, clock.time_s, tracer, scan, work.recipients)
         elif event.kind == ROBOT_STOPS:
             until_s = note_stop(team.faults, event.number)
             note_motion(
