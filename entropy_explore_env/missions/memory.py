@@ -17,10 +17,10 @@ from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
 
-_SHOWN_BYTES = 18
-"""Of a number of an observation: two float32, of the missions and handed out, and its bounds in spaces."""
-_WORLD_BYTES = 12
-"""Of a voxel of a world: whether it is solid, and for each kind of robot masks and the number of a start."""
+_SHOWN_BYTES, _SPACE_BYTES, _LAYOUT_BYTES = 8, 10, 16
+"""Of a number of an observation: in the missions and handed out, its bounds in a space, and in the layout."""
+_LAYER_BYTES = 10
+"""Of a voxel of a world for each kind of robot: two masks, and the number of a start."""
 _SEARCH_BYTES, _PROPOSAL_BYTES = 21, 42
 """Of a voxel in a thread's memory for paths, and for candidates, once searches have come there."""
 _PARTS = (
@@ -91,7 +91,8 @@ def memory_needs(scenario: Scenario, batch: Batch) -> list[Need]:
         names = [name for name in sizes if name.startswith(beginnings)]
         needs.append(Need(purpose, sum(sizes.pop(name) for name in names), setting))
     maps = sum(sizes.values()) + _world_bytes(scenario, batch)
-    shown = _SHOWN_BYTES * batch.missions * scenario.robots
+    rows = batch.missions * scenario.robots
+    shown = _SHOWN_BYTES * rows + _SPACE_BYTES * (rows + scenario.robots) + _LAYOUT_BYTES
     return [
         Need("maps", maps, "missions" if batch.missions > 1 else "Grid.voxel_size_m"),
         *needs,
@@ -107,7 +108,7 @@ def _world_bytes(scenario: Scenario, batch: Batch) -> int:
     """Return about the size of worlds with their masks and starts; worlds of recipes are drawn anew."""
     drawn = scenario.world in RECIPES and scenario.world != "empty"
     worlds = len(batch.given) or (batch.missions if drawn else 1)
-    return worlds * _WORLD_BYTES * len(set(scenario.kinds)) * scenario.grid.voxels
+    return worlds * (1 + _LAYER_BYTES * len(set(scenario.kinds))) * scenario.grid.voxels
 
 
 def _scratch_needs(scenario: Scenario, batch: Batch) -> list[Need]:
