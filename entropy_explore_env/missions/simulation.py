@@ -270,12 +270,11 @@ class Missions:
         change = checked_change(self.grid, low_m, high_m, solid, now_s if at_s is None else float(at_s))
         if at_s is not None:
             self._changes[mission].append(change)
-            self.world_changes[mission] = True
         elif (robot := robot_in_the_way(self.rules, self.state, mission, change)) is not None:
             raise SettingError("low_m, high_m", (low_m, high_m), f"a box that robot {robot} does not touch")
         else:
             self._change(mission, change)
-            self.world_changes[mission] = True
+        self.world_changes[mission] = True
 
     def _change(self, mission: int, change: WorldChange) -> None:
         """Change a mission's world now."""
