@@ -1,4 +1,4 @@
 """What one robot holds to be true, and what can be read off it.
 
-What arguments of kernels are is said in `robots`.
+The arguments that kernels have in common are described in `robots`.
 """

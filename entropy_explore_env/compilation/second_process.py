@@ -2,7 +2,7 @@
 
 Both are given the same kernels. This one goes through the kernels that each of them calls from the first to
 the last, the helper from the last to the first; what one has compiled the other finds on disk, and they meet
-in the middle. The helper starts when a step's kernels are not on disk, never else. It ends with this process,
+in the middle. The helper starts only when a step's kernels are not on disk. It ends with this process,
 or when it has had nothing to do for a while.
 """
 

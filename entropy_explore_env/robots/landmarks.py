@@ -149,10 +149,10 @@ def foresee_landmark(covariance, landmark, here, away, sigmas, matrices):
 
 @lean_kernel
 def take_landmark(covariance, landmark, seen, expected, sigmas, matrices):
-    """Return (x, y, z, yaw) that a sighting takes from an estimate, and take it in where its landmark is.
+    """Lower a covariance by a sighting of a landmark; returns (x, y, z, yaw), to be taken from the estimate.
 
-    It tells of what was added since the landmark was chosen: `added_since` has filled `matrices`, of which
-    the first is changed. Other arguments as of `correct_by_landmark`.
+    The sighting tells of what was added since the landmark was chosen: `added_since` has filled `matrices`,
+    of which the first is changed. Other arguments as of `correct_by_landmark`.
     """
     added, believed, first = matrices[0], landmark.believed, landmark.seen_from
     far_m = length((believed[0] - first[0], believed[1] - first[1], believed[2] - first[2]))

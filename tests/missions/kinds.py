@@ -163,7 +163,7 @@ KINDS = {
 
 
 def walked(kind: str, steps: int, seed: int = 1, missions: int = 2) -> Missions:
-    """Return missions of a kind after so many random actions."""
+    """Return missions of a kind after this many steps of random actions."""
     these = Missions(KINDS[kind].scenario, missions, given=KINDS[kind].given)
     these.reset_some(range(missions), range(seed, seed + missions))
     wander(these, steps, seed)

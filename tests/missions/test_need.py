@@ -134,13 +134,12 @@ def test_a_message_by_hand(prepared):
 
 
 def test_messages_fit_into_the_bits_of_a_burst():
-    spent = []
+    spent, fields = [], ("messages_sent", "measurements_sent", "bits_sent")
     missions = started(free_box(robots=3, channel={**NEED, "loss_probability": 0.5}, **UNENDING))
 
     def note(_):
-        spent.append([robots_of(missions, name).copy() for name in FIELDS])
+        spent.append([robots_of(missions, name).copy() for name in fields])
 
-    FIELDS = ("messages_sent", "measurements_sent", "bits_sent")
     wander(missions, 80, 5, note)
     messages, measured, bits = np.diff(np.array(spent), axis=0).transpose(1, 0, 2)
     poses, rest = np.divmod(bits - messages * (160 + 2 * 48) - 96 * measured, 160)

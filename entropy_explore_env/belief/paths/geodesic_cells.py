@@ -255,8 +255,8 @@ def extract_path(
 ) -> np.ndarray:
     """Return (N,) int64 voxels of the cheapest path from a cell's source to a voxel in it, both included.
 
-    It does not leave the cell, and is read off the costs backwards; none if no source reaches the voxel.
-    Costs are those of `tessellate`.
+    It does not leave the cell, and is read off the costs backwards; it is empty if no source reaches the
+    voxel. Costs are those of `tessellate`.
     """
     steps = np.array([(length if by_length else 1.0, length_cost * length) for length in DIAGONALS])
     cells, costs = space.cells, space.costs

@@ -15,8 +15,6 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from tests.reference.scenes import flat_index
 
 PRIOR = 1.0 / 900.0
-
-
 KNOWN, UNKNOWN = 100.0, PRIOR
 
 
@@ -69,7 +67,7 @@ def costs_to_all(search, costs):
 
 
 def shortest_path(search, lattice, costs, start, goal, max_cost=math.inf):
-    """Cost and voxels (N,) of the cheapest path from a voxel to another; (inf, none) if there is none."""
+    """Cost and voxels (N,) of the cheapest path from a voxel to another; inf and no voxels without a path."""
     cost = search_paths(search, lattice, costs, np.array([start], np.int32), int(goal), float(max_cost))
     path = np.empty(extract_path(search, lattice, int(goal), np.empty(0, np.int32)), np.int32)
     extract_path(search, lattice, int(goal), path)
