@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from entropy_explore_env.envs.keywords import EnvironmentSettings, ScenarioSettings
 
+_OVER = "step after the mission's end: call reset() first"
 _SENT_BY_CHECKERS = {"options": 1}
 """What `parallel_api_test` and `api_test` of PettingZoo reset with."""
 _PARTS = (layout.__doc__ or "").partition("\n\n")[2]
@@ -219,8 +220,8 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
     def _in_order(self, actions: Mapping[str, Any]) -> list[tuple[str, Any]]:
         """Return the actions in the order of the robots, if there is one for each."""
         if not self.agents:
-            late = "after the mission's end" if self.missions.episodes[0] >= 0 else "before reset"
-            raise CallOrderError(f"step {late}: call reset() first")
+            self.missions.check_begun("step")
+            raise CallOrderError(_OVER)
         if not isinstance(actions, Mapping):
             raise ActionError("actions", actions, "a dict from agent to action")
         if len(actions) != len(self.agents) or any(agent not in actions for agent in self.agents):
@@ -330,9 +331,9 @@ class TurnTakingEnv(OrderEnforcingWrapper[str, Any, Any]):
             CallOrderError: There was no reset, or the mission is over for all robots.
             ActionError: The action is not allowed; once the mission is over, None alone is.
         """
-        if self._team.missions.episodes[0] < 0 or not self.agents:
-            late = "after the mission's end" if self._team.missions.episodes[0] >= 0 else "before reset"
-            raise CallOrderError(f"step {late}: call reset() first")
+        self._team.missions.check_begun("step")
+        if not self.agents:
+            raise CallOrderError(_OVER)
         agent = self.agent_selection
         if not (self.terminations[agent] or self.truncations[agent]):
             self._team.check_action(agent, action)
