@@ -15,13 +15,12 @@ from typing import Literal
 import numpy as np
 
 from baselines.papers.bhattacharya.simulation.belief import GridBelief, Readings, Scanner
-from baselines.strategies.voronoi.controls import (
+from baselines.papers.bhattacharya.simulation.covering import (
     CellFunctional,
     coverage_functional,
-    nearest_uncertain,
-    projected_centroid,
     step_is_free,
 )
+from baselines.strategies.voronoi.controls import nearest_uncertain, projected_centroid
 from entropy_explore_env.belief.paths.geodesic_cells import (
     UNREACHED,
     extract_path,

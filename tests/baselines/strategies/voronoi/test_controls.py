@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import numpy as np
@@ -10,19 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.strategies.voronoi.controls import (
-    CellFunctional,
-    coverage_functional,
-    nearest_uncertain,
-    neighbours,
-    projected_centroid,
-)
-from entropy_explore_env.belief.paths.geodesic_cells import (
-    UNREACHED,
-    extract_path,
-    new_tessellation,
-    tessellate,
-)
+from baselines.strategies.voronoi.controls import nearest_uncertain, projected_centroid
+from entropy_explore_env.belief.paths.geodesic_cells import UNREACHED, new_tessellation, tessellate
 from tests.belief.paths.test_geodesic_cells import drawn_rates
 from tests.reference.scenes import SHAPES, drawn, seeds
 
@@ -77,9 +65,6 @@ def test_targets_are_those_of_the_equations(size, seed, threshold, by_length):
         costs = np.where(mask, space.costs, np.inf).reshape(-1)
         near = nearest_uncertain(voxels, space.costs, density, threshold)
         assert near == (int(np.argmin(costs)) if mask.any() else UNREACHED)
-        functional, count = coverage_functional(space.cells, space.costs, density, number)
-        assert count == len(voxels)
-        assert functional == pytest.approx((space.costs[own] ** 2 * density[own]).sum())
 
 
 def test_a_centroid_outside_of_its_cell_by_hand():
@@ -92,64 +77,3 @@ def test_a_centroid_outside_of_its_cell_by_hand():
     assert projected_centroid(np.flatnonzero(cells == 1), density, 2.0) == UNREACHED
     density[2, 3, 0] = 3.0
     assert projected_centroid(voxels, density, 2.0) == 11
-
-
-@given(st.sampled_from(SHAPES), seeds, st.booleans())
-@drawn(30)
-def test_paths_stay_in_the_cell_and_cost_what_the_tessellation_says(size, seed, by_length):
-    rates, _, sources, space = scene(size, seed, by_length)
-    for voxel in range(0, rates.size, 3):
-        path = extract_path(space, rates, voxel, 0.01, by_length)
-        cell = space.cells.reshape(-1)[voxel]
-        if cell == UNREACHED:
-            assert len(path) == 0
-            continue
-        assert path[0] == sources[cell] and path[-1] == voxel
-        assert (space.cells.reshape(-1)[path] == cell).all()
-        cost = 0.0
-        for here, there in itertools.pairwise(path.tolist()):
-            assert there in neighbours(np.isfinite(rates), here)
-            axes = np.abs(np.subtract(np.unravel_index(here, size), np.unravel_index(there, size))).sum()
-            length, flat = math.sqrt(axes), rates.reshape(-1)
-            mean = 0.5 * (float(flat[here]) + float(flat[there]))
-            cost += mean * (length if by_length else 1.0) + 0.01 * length
-        assert cost == pytest.approx(float(space.costs.reshape(-1)[voxel]), rel=1e-6)
-
-
-@given(st.sampled_from(SHAPES), seeds)
-@drawn(30)
-def test_neighbours_are_those_to_which_no_step_cuts_a_corner(size, seed):
-    """A diagonal step is free if all the steps along its axes, in any order, are."""
-    free = np.random.default_rng(seed).random(size) < 0.7
-    for here in range(0, free.size, 5):
-        found = neighbours(free, here)
-        for there in range(free.size):
-            steps = np.subtract(np.unravel_index(there, size), np.unravel_index(here, size))
-            axes = [axis for axis in range(3) if steps[axis]]
-            wanted = 0 < len(axes) and np.abs(steps).max() == 1
-            for order in itertools.permutations(axes) if wanted else ():
-                place = list(np.unravel_index(here, size))
-                for axis in order:
-                    place[axis] += steps[axis]
-                    wanted &= bool(free[tuple(place)])
-            assert (there in found) == wanted
-
-
-def test_gradient_search_walks_to_the_middle_of_a_corridor():
-    size = (9, 1, 1)
-    rates, space = np.ones(size, np.float32), new_tessellation(size)
-    density, cell = np.ones(size, np.float32), np.ones(size, bool)
-    functional, place, path = CellFunctional(space, rates, density, cell, (0.0, True)), 1, [1]
-    assert functional.value(1) == 1 + sum(k * k for k in range(8))
-    while (step := functional.step(place)) != place:
-        place = step
-        path.append(step)
-    assert path == [1, 2, 3, 4]
-
-
-def test_a_place_from_which_the_cell_cannot_be_reached_whole_is_worth_nothing():
-    size = (5, 1, 1)
-    rates, cell = np.ones(size, np.float32), np.array([1, 1, 0, 1, 1], bool).reshape(size)
-    density = np.ones(size, np.float32)
-    functional = CellFunctional(new_tessellation(size), rates, density, cell, (0.0, True))
-    assert functional.value(0) == math.inf
