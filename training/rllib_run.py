@@ -23,7 +23,7 @@ from entropy_explore_env.writing import write_atomically
 from training.advantages import Discounting
 from training.checkpoints import PolicySettings, checkpoint_name, forget_later, save_checkpoint
 from training.policy import load_policy, panorama_form
-from training.ppo import OWN
+from training.ppo_options import OWN
 from training.validation import Validation, Validator
 
 if TYPE_CHECKING:
