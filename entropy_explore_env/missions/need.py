@@ -168,10 +168,12 @@ def deliver(backlog, mission, tracer, scan, index, age, recipients):
     unpack_measurements(params, tracer, 0, scan, backlog.poses[index, slot], chosen.rays, count)
     weigh_batch(team.localization, backlog.covariances[index], slot, scan, count, params.voxel_size_m)
     for mate in range(len(team.robots)):
+        if not recipients[mate]:
+            continue
         new = 0
         for place in range(count):
             ray = chosen.order[place]
-            if recipients[mate] and backlog.heard_s[index, slot, ray, mate] == 0.0:
+            if backlog.heard_s[index, slot, ray, mate] == 0.0:
                 backlog.heard_s[index, slot, ray, mate] = time_s
                 scan.order[new] = place
                 new += 1
