@@ -83,16 +83,16 @@ def test_bodies_never_overlap_and_never_stand_in_solid_voxels(crowd):
     blocked = [missions.worlds[0].layout(scenario, kind).collision_mask > 0 for kind in kinds]
     robots, grid, params = missions.state.robots[0], missions.grid, missions.rules.params
     looks = 9 if math.isinf(scenario.sensor.scan_every_m) else 1
-    pairs, closest, before_s, ends = np.triu_indices(len(radii), 1), [math.inf], 0.0, set()
+    pairs, closest, before_s, ends = np.triu_indices(len(radii), 1), math.inf, 0.0, set()
 
     def look(_step):
-        nonlocal before_s
+        nonlocal before_s, closest
         now_s = missions.state.missions[0]["time_s"]
         for time_s in np.linspace(now_s, before_s, looks, endpoint=False):
             places = np.array([pose_at(*each, time_s)[:3] for each in zip(params, robots, strict=True)])
             apart = np.linalg.norm(places[:, None] - places[None], axis=-1) - radii[:, None] - radii
-            closest[0] = min(closest[0], apart[pairs].min())
-            assert apart[pairs].min() >= 0.0
+            closest = min(closest, apart[pairs].min())
+            assert closest >= 0.0
             voxels = grid.voxel_of(places)
             assert ((voxels >= 0) & (voxels < grid.shape)).all()
             assert not any(mask[tuple(voxel)] for mask, voxel in zip(blocked, voxels, strict=True))
@@ -100,6 +100,6 @@ def test_bodies_never_overlap_and_never_stand_in_solid_voxels(crowd):
         ends.update(list(MoveEnd)[end].name for end in robots["move_end"][robots["deciding"]])
 
     wander(missions, steps, 3, look)
-    assert closest[0] < 0.1 * 2 * radii.max()  # they did meet
+    assert closest < 0.1 * 2 * radii.max()  # they did meet
     assert "TEAMMATE" in ends and ends & {"ARRIVED", "SEEN"} and robots["blocked_moves"].min() > 1
     assert ("NO_PATH" in ends) == (scenario.robot.navigator == "planned")

@@ -23,8 +23,7 @@ AT_ONCE = {"turn_rate_rad_s": math.inf}
 
 def team(faults, **changes):
     """Two robots of the box, about to go where they are sent; they turn at once."""
-    missions = standing(HERE, STAY, faults=faults, robot={**AT_ONCE, **changes.pop("robot", {})}, **changes)
-    return missions
+    return standing(HERE, STAY, faults=faults, robot={**AT_ONCE, **changes.pop("robot", {})}, **changes)
 
 
 def test_a_robot_that_stops_stands_where_it_was_and_stays_there():

@@ -96,7 +96,7 @@ def test_what_is_chosen_is_what_sorting_everything_gives(prepared, seed):
     assert bits == cost <= 160 + 96 * 12
 
 
-def test_who_lacks_what_by_hand(prepared):
+def test_which_teammates_lack_a_measurement_by_hand(prepared):
     """Robot 1 asks of a measurement that it sent at 5 s; robot 0 heard it then, robot 2 did not."""
     state = prepared.state
     state.backlog_sent_s[0, 1, 2, 3], state.backlog_heard_s[0, 1, 2, 3] = 5.0, (5.0, 0.0, 0.0)

@@ -20,7 +20,7 @@ class Motions:
     """Looks at robots' poses between decisions: do they keep to the limits, and out of what is solid."""
 
     def __init__(self, missions):
-        self.missions, self.turns, self.brakes = missions, 0, 0
+        self.missions = missions
         self.last = self.motions(0.0)
         self.time_s = 0.0
 
@@ -48,8 +48,6 @@ class Motions:
             self.last = motions
         assert (robots["decided_s"][decided] == self.time_s).all()
         assert ((robots["decided_s"] < now_s) | ~robots["deciding"]).all()  # time has passed since
-        self.turns += (decided & (robots["lead_s"] > 0.0)).sum()
-        self.brakes += (decided & (robots["lead_s"] < 0.0)).sum()
         self.time_s = now_s
 
     def outside_of_solid(self, places):

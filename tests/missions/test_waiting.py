@@ -23,8 +23,7 @@ WAITS = {
 
 def behind_a_teammate(**changes):
     """Robot 0 is about to be stopped after half a metre, by robot 1: 2 s, and 0.5 s for the scan."""
-    missions = standing(HERE, STAY, robot={**WAITS, **changes.pop("robot", {})}, **changes)
-    return missions
+    return standing(HERE, STAY, robot={**WAITS, **changes.pop("robot", {})}, **changes)
 
 
 def test_a_robot_behind_a_teammate_scans_waits_and_then_decides():

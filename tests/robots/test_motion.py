@@ -136,7 +136,7 @@ def test_drives_by_hand():
     assert drive(blocked, (1.5, 5.5, 2.5), (-1.0, 0.0, 0.0), 9.0) == (1.0, MoveEnd.WALL)
     assert drive(blocked, (1.5, 5.5, 2.5), east, 0.0) == (0.0, MoveEnd.ARRIVED)
     assert drive(blocked, (5.5, 5.5, 2.5), east, 1.0) == (1.0, MoveEnd.ARRIVED)  # out of a solid voxel
-    # The face x = 5 belongs to voxel 5, and the boundary x = 7 to voxel 7, which there is not.
+    # The face x = 5 belongs to voxel 5; the boundary x = 7 would belong to voxel 7, which does not exist.
     assert drive(blocked, (1.5, 5.5, 2.5), east, 3.5) == (3.0, MoveEnd.OBSTACLE)
     assert drive(np.zeros(SIZE, np.float32), (1.5, 5.5, 2.5), east, 5.5) == (5.0, MoveEnd.WALL)
 

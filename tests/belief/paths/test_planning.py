@@ -39,7 +39,7 @@ from tests.reference.scenes import SHAPES, drawn, flat_index, random_cover, seed
 
 SIZE = (7, 11, 5)
 FLAT = (9, 6, 1)
-SQRT2, SQRT3 = math.sqrt(2.0), math.sqrt(3.0)
+SQRT2 = math.sqrt(2.0)
 
 
 @drawn(30)
