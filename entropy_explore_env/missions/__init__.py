@@ -1,7 +1,7 @@
 """Robots in worlds, many missions at once.
 
-Arguments of kernels have the same names and types in all modules of this room. Docstrings describe others,
-and these where they mean something else.
+Arguments of kernels that have these names mean the same in all modules of this room, unless a docstring says
+otherwise. Docstrings describe the other arguments.
 
     first, last         range of missions of a call; the end is not included
     rules, state        Rules and MissionState of E missions
