@@ -33,6 +33,7 @@ from baselines.experiments.mission import Surroundings
 from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.rows import Record
 from baselines.experiments.statistics import Interval, median_interval, median_ratio_interval
+from baselines.experiments.tables import terminal_table
 from baselines.experiments.trials import Cell, How, by_cell, run_cells
 from baselines.strategies import is_learned, make_strategy, resolved, shown_names
 from entropy_explore_env.errors import SettingError, counted
@@ -247,23 +248,16 @@ def _row(
 
 def show(compared: dict[str, Any]) -> None:
     """Print a comparison as a table."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     seeds, robots = compared["seeds"], compared["robots"]
     missions = f"{counted(seeds, 'mission')} each, worlds of the split {compared['split']}"
-    title = f"{compared['scenario']}, {counted(robots, 'robot')}, {missions}"
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    table.add_column("strategy", overflow="fold")
-    for head in ("mission time", "finished", "scans", "ratio", "faster"):
-        table.add_column(head, justify="right", no_wrap=True)
+    print(f"{compared['scenario']}, {counted(robots, 'robot')}, {missions}\n")
     names = shown_names(row["strategy"] for row in compared["rows"])
+    rows = []
     for row in compared["rows"]:
         name, median, _, *others = table_cells(row, seeds)
         short = (cell.partition(" of ")[0].replace(" (", "\n(") for cell in (median, *others))
-        table.add_row(names[name], *short)
-    Console(highlight=False).print(table)
+        rows.append([names[name], *short])
+    print(terminal_table(["strategy", "mission time", "finished", "scans", "ratio", "faster"], rows))
     print("mission time: median; ratio: the policy's median over the strategy's (95 % intervals);")
     print("faster: starts on which the policy was faster")
     there = {row["strategy"] for row in compared["rows"]}
