@@ -97,7 +97,7 @@ def floor(shape: tuple[int, int, int]) -> World:
 
 
 def floor_row(name: str, world: World) -> Row:
-    """Seconds on the clock until three robots with lasers of 10 m have seen 99 % of a floor."""
+    """Return the seconds on the clock until three robots with lasers of 10 m have seen 99 % of a floor."""
     _floor_s(floor((90, 70, 1)))  # compiles
     across, along, _ = world.grid.shape
     job = f"a mission of 3 robots in {name}, {across} × {along} cells, by per-time-visibility, to 99 %"

@@ -28,7 +28,7 @@ _PRIOR, _KNOWN = 1e-3, 100.0
 
 
 def cluttered(shape: tuple[int, int, int], share: float, seed: int = 0) -> np.ndarray:
-    """(X, Y, 1) bool, boxes of 4-39 cells over this share of the floor."""
+    """Return (X, Y, 1) bool, boxes of 4-39 cells over this share of the floor."""
     rng, covered = np.random.default_rng(seed), np.zeros(shape, bool)
     while covered.mean() < share:
         x, y = rng.integers(0, shape[:2])
@@ -38,7 +38,7 @@ def cluttered(shape: tuple[int, int, int], share: float, seed: int = 0) -> np.nd
 
 
 def rooms(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
-    """(X, Y, 1) bool, walls every 40 cells, with a door of 6 cells between neighbouring rooms."""
+    """Return (X, Y, 1) bool, walls every 40 cells, with a door of 6 cells between neighbouring rooms."""
     rng, covered = np.random.default_rng(seed), np.zeros(shape, bool)
     for x in range(_ROOM, shape[0], _ROOM):
         covered[x] = True
@@ -74,7 +74,7 @@ def maze(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
 
 
 def noise(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
-    """(X, Y, 1) float32, traversal costs drawn from 0.05 to 1 for each voxel by itself."""
+    """Return (X, Y, 1) float32, traversal costs drawn from 0.05 to 1 for each voxel by itself."""
     return np.random.default_rng(seed).uniform(0.05, 1.0, shape).astype(np.float32)
 
 
@@ -106,7 +106,7 @@ def planning_rows(effort: Effort) -> list[Row]:
 
 
 def traversal_costs(covered: np.ndarray) -> np.ndarray:
-    """(X, Y, 1) float32, 1 where it is free, inf elsewhere."""
+    """Return (X, Y, 1) float32, 1 where it is free, inf elsewhere."""
     return np.where(covered, np.inf, 1.0).astype(np.float32)
 
 

@@ -77,7 +77,7 @@ class Goal:
         return f"{self.sign} {self.limit:g} {self.unit}"
 
     def holds(self, value: float) -> bool:
-        """Whether a value reaches it."""
+        """Return whether a value reaches it."""
         return bool(_COMPARE[self.sign](value, self.limit))
 
 

@@ -52,7 +52,7 @@ _WALK_STEPS = 300
 
 
 def turns(steps: int, missions: int, seed: int) -> np.ndarray:
-    """(warming + steps, missions, A, 5) float32 actions: no displacement, a random yaw, level."""
+    """Return (warming + steps, missions, A, 5) float32 actions: no displacement, a random yaw, level."""
     actions = np.zeros((_WARMING_STEPS + steps, missions, ROBOTS, 5), np.float32)
     actions[..., 3] = np.random.default_rng(seed).uniform(-1.0, 1.0, actions.shape[:-1])
     return actions

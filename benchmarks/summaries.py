@@ -12,7 +12,7 @@ _THRESHOLD_BITS = 0.5
 
 
 def known_plan(seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and precision, (1000, 1000, 1) float32, of a plan of rooms with things in them.
+    """Return the mean and precision, (1000, 1000, 1) float32, of a plan of rooms with things in them.
 
     What was measured are discs of 8 m in cells of 0.1 m, as around the places of scans, more precisely near
     them (σ as `RangeSensor` has it); where more of them overlap, more is known.

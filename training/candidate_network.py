@@ -126,7 +126,7 @@ class _Attention(nn.Module):
     def forward(
         self, tokens: torch.Tensor, exists: torch.Tensor, overlap: torch.Tensor | None
     ) -> torch.Tensor:
-        """(N, K, D) from (N, K, D)."""
+        """Return (N, K, D) from (N, K, D)."""
         count, candidates, width = tokens.shape
         shape = (count, candidates, self.heads, width // self.heads)
         query, key, value = (
@@ -179,13 +179,13 @@ class CandidateActor(nn.Module):
         return torch.where(seen.exists, logits, _NEVER)
 
     def _planner(self, seen: Seen) -> torch.Tensor:
-        """(N, K) what the planner says of the candidates."""
+        """Return (N, K) what the planner says of the candidates."""
         score, chosen = (seen.candidates[:, :, each] for each in (self.parts.score, self.parts.chosen))
         behind = score.clamp(_LEAST_SCORE, 1.0).log()
         return self.log_beta.exp() * behind + self.log_margin.exp() * chosen
 
     def _tokens(self, seen: Seen) -> torch.Tensor:
-        """(N, K, D) what is known of the candidates, each in the light of the others."""
+        """Return (N, K, D) what is known of the candidates, each in the light of the others."""
         context = seen.context[:, None, :].expand(-1, seen.candidates.shape[1], -1)
         tokens = self.each(torch.cat([seen.candidates, context], dim=2))
         for layer in self.layers:

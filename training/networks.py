@@ -54,23 +54,23 @@ class MoveAndGaze(CategoricalDistribution):
         """Stable-Baselines3 sets None at first; there is nothing to set."""
 
     def log_prob(self, actions: torch.Tensor) -> torch.Tensor:
-        """(N,) logarithms of the probabilities of actions (N,)."""
+        """Return (N,) logarithms of the probabilities of actions (N,)."""
         chosen, gazes = actions.long()[:, None], self._sizes[1]
         parts = self._moves.gather(1, chosen // gazes) + self._gazes.gather(1, chosen % gazes)
         return parts[:, 0]
 
     def entropy(self) -> torch.Tensor:
-        """(N,) entropies in nats."""
+        """Return (N,) entropies in nats."""
         moves, gazes = self._moves, self._gazes
         return -(moves.exp() * moves).sum(dim=1) - (gazes.exp() * gazes).sum(dim=1)
 
     def sample(self) -> torch.Tensor:
-        """(N,) actions."""
+        """Return (N,) actions."""
         moves, gazes = (torch.multinomial(part.exp(), 1)[:, 0] for part in (self._moves, self._gazes))
         return moves * self._sizes[1] + gazes
 
     def mode(self) -> torch.Tensor:
-        """(N,) likeliest actions."""
+        """Return (N,) likeliest actions."""
         return self._moves.argmax(dim=1) * self._sizes[1] + self._gazes.argmax(dim=1)
 
 
@@ -149,7 +149,7 @@ class MapFeatures(VectorFeatures):
 
 
 def _convolution(shape: tuple[int, ...], channels: int, features: int) -> nn.Module:
-    """(N, C, x, y[, z]) maps to (N, features)."""
+    """Return a network from maps (N, C, x, y[, z]) to (N, features)."""
     flat = shape[3] == 1
     convolution = nn.Conv2d if flat else nn.Conv3d
     layers = nn.Sequential(
@@ -169,7 +169,7 @@ _AROUND = tuple(itertools.product((-1, 0, 1), (-1, 0, 1)))
 
 
 def _places_around(yaws: int, pitches: int) -> np.ndarray:
-    """(D·18,) indices into a panorama (2, D): both channels of the nine directions around each gaze.
+    """Return (D·18,) indices into a panorama (2, D): both channels of the nine directions around each gaze.
 
     Yaws wrap around; at the highest and lowest pitch, the direction itself stands for what lies beyond. (A
     gather and a product are three times as fast as a convolution of so few channels.)
@@ -365,7 +365,7 @@ def gazes_of(scenario: Scenario) -> tuple[int, int]:
 
 
 def action_count(scenario: Scenario) -> int:
-    """How many discrete actions a robot of a scenario has."""
+    """Return how many discrete actions a robot of a scenario has."""
     space = action_space(scenario)
     assert isinstance(space, spaces.Discrete)
     return int(space.n)

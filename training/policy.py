@@ -126,7 +126,7 @@ def normalise_observations(policy: ActorCriticPolicy, stats: Normaliser) -> None
 def choose_actions(
     policy: ActorCriticPolicy, observations: np.ndarray, rng: torch.Generator | None
 ) -> np.ndarray:
-    """Actions for observations, without touching the random state that training draws from.
+    """Return the actions for observations, without touching the random state that training draws from.
 
     Args:
         policy: Chooses; one over candidates always takes its likeliest action, which needs no draw.
@@ -152,7 +152,7 @@ def choose_actions(
 
 
 def panorama_form(kind: str, yaws: int, pitches: int) -> dict[str, dict[str, Any]]:
-    """Actions and observation of a policy that looks at a panorama, with a ray for each gaze."""
+    """Return the actions and observation of a policy that looks at a panorama, with a ray for each gaze."""
     return {
         "action": {"kind": kind, "moves": "axes", "yaws": yaws, "pitches": pitches},
         "observation": {

@@ -303,7 +303,7 @@ class DecisionPPO(PPO):
         return actions, torch.as_tensor(values), torch.as_tensor(log_probs)
 
     def _final_values(self, dones: np.ndarray, infos: list[dict[str, Any]]) -> np.ndarray:
-        """(N,) values of the last observations of missions that were cut off, else 0."""
+        """Return (N,) values of the last observations of missions that were cut off, else 0."""
         values = np.zeros(len(dones))
         cut_off = [row for row in np.flatnonzero(dones) if infos[row]["TimeLimit.truncated"]]
         if cut_off:
@@ -346,7 +346,7 @@ def validate(
 
 
 def finished(args: Args, state: TrainingState) -> bool:
-    """Whether all steps are done, and the last validation, too."""
+    """Return whether all steps are done, and the last validation, too."""
     steps = state.model.num_timesteps
     return steps >= args.total_steps and state.progress.validated(steps)
 

@@ -66,7 +66,7 @@ class Progress:
         return True
 
     def validated(self, steps: int) -> bool:
-        """Whether the latest validation was after this many steps."""
+        """Return whether the latest validation was after this many steps."""
         return bool(self.curve) and self.curve[-1]["steps"] == steps
 
     def curve_csv(self) -> str:

@@ -96,7 +96,7 @@ class SharedPolicyModule(TorchRLModule, ValueFunctionAPI):
         return self._forward(batch, **kwargs)
 
     def compute_values(self, batch: dict[str, Any], embeddings: Any = None) -> torch.Tensor:  # noqa: ANN401
-        """(N,) normalised values of the observations of a batch."""
+        """Return (N,) normalised values of the observations of a batch."""
         del embeddings
         return self.policy.predict_values(batch[Columns.OBS])[:, 0]
 
@@ -131,7 +131,7 @@ class _Actions(Distribution):
         return self.shared.proba_distribution(action_logits=self._scores)
 
     def sample(self, **kwargs: Any) -> torch.Tensor:  # noqa: ANN401 - RLlib's
-        """(N,) actions."""
+        """Return (N,) actions."""
         del kwargs
         return self._drawn.sample()
 
@@ -140,12 +140,12 @@ class _Actions(Distribution):
         raise NotImplementedError
 
     def logp(self, value: torch.Tensor, **kwargs: Any) -> torch.Tensor:  # noqa: ANN401 - RLlib's
-        """(N,) logarithms of the probabilities of actions (N,)."""
+        """Return (N,) logarithms of the probabilities of actions (N,)."""
         del kwargs
         return self._drawn.log_prob(value)
 
     def entropy(self, **kwargs: Any) -> torch.Tensor:  # noqa: ANN401 - RLlib's
-        """(N,) entropies in nats."""
+        """Return (N,) entropies in nats."""
         del kwargs
         entropy = self._drawn.entropy()
         assert entropy is not None
@@ -221,7 +221,7 @@ class Chunks(NamedTuple):
     decided: np.ndarray
 
     def advantages(self, elapsed_s: np.ndarray, discounting: Discounting) -> np.ndarray:
-        """(K,) advantages of the decisions, whose rewards count at their ends.
+        """Return (K,) advantages of the decisions, whose rewards count at their ends.
 
         Args:
             elapsed_s: (K,) seconds until the robot decided again.

@@ -269,7 +269,7 @@ class TrainingState:
         return self.model.rollout_buffer
 
     def summary(self) -> dict[str, Any]:
-        """How far the run is, and how it was started, as JSON holds it."""
+        """Return how far the run is, and how it was started, as JSON holds it."""
         return {
             "command": self.command,
             "args": self.options,

@@ -74,7 +74,7 @@ def true_world(frame: Frame, recorder: Recorder) -> Frame:
 
 
 def _sent(recorder: Recorder) -> tuple[np.ndarray, str]:
-    """(T,) what the team has sent so far, and the axis' label; scans of a robot that is alone."""
+    """Return (T,) what the team has sent so far, and the axis' label; scans of a robot that is alone."""
     scenario, series = recorder.missions.scenario, recorder.series()
     if scenario.robots == 1:
         return series.scans[:, 0], "scans"

@@ -112,7 +112,7 @@ def named(figures: dict[str, Any]) -> str:
 
 
 def _setting(scenario: Scenario) -> Iterator[tuple[str, str]]:
-    """Where a mission took place and whose robots were there: rows of the table."""
+    """Return where a mission took place and whose robots were there: rows of the table."""
     grid = scenario.grid
     axes = 2 if grid.flat else 3
     yield "world", f"{' × '.join(map(str, grid.shape[:axes]))} voxels of {grid.voxel_size_m:.4g} m"

@@ -133,7 +133,7 @@ def base_task(
 
 
 def is_whole_scenario(settings: str | None) -> bool:
-    """Whether a file of settings is a scenario of its own, and changes no named one.
+    """Return whether a file of settings is a scenario of its own, and changes no named one.
 
     Raises:
         SettingError: It holds no settings of a scenario.
@@ -269,7 +269,7 @@ def worlds_of(options: TaskOptions, files: Sequence[str] | None = None) -> dict[
 
 
 def reset_options(starts: str | None, world_number: int | None, scenario: Scenario) -> dict[str, Any]:
-    """Options of `reset` from a command line.
+    """Return the options of `reset` from a command line.
 
     Args:
         starts: JSON text (it begins with a bracket), or the path of a file that holds it: a list of A poses,

@@ -220,7 +220,7 @@ def record_mission(
 
 
 def _mean_distance_apart_m(places_m: np.ndarray) -> float:
-    """Mean distance between two robots over the moments (T, A, 3); 0 for one robot."""
+    """Return the mean distance between two robots over the moments (T, A, 3); 0 for one robot."""
     moments, robots, _ = places_m.shape
     distances_m = np.linalg.norm(places_m[:, :, None] - places_m[:, None], axis=-1)
     return float(distances_m.sum() / max(moments * robots * (robots - 1), 1))

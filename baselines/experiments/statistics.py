@@ -47,25 +47,25 @@ class Interval(NamedTuple):
 
 
 def mean_interval(values: Sample) -> Interval:
-    """Mean and its interval."""
+    """Return the mean and its interval."""
     sample = np.asarray(values, float)
     return Interval(float(sample.mean()), *_central(_resampled(sample, len(sample)).mean(axis=1)))
 
 
 def median_interval(values: Sample) -> Interval:
-    """Median and its interval."""
+    """Return the median and its interval."""
     sample = np.asarray(values, float)
     medians = np.median(_resampled(sample, len(sample)), axis=1)
     return Interval(float(np.median(sample)), *_central(medians))
 
 
 def small_mean_range(values: Sample, missions: int) -> Range:
-    """Where 95 % of the means of only this many missions lie."""
+    """Return where 95 % of the means of only this many missions lie."""
     return _central(_resampled(np.asarray(values, float), missions).mean(axis=1))
 
 
 def central_range(values: Sample) -> Range:
-    """Where the central 95 % of the values themselves lie."""
+    """Return where the central 95 % of the values themselves lie."""
     return _central(np.asarray(values, float))
 
 
@@ -152,6 +152,6 @@ def _central(values: np.ndarray) -> Range:
 
 
 def _resampled(sample: np.ndarray, size: int, stream: int = 0) -> np.ndarray:
-    """(B, size, …) draws with replacement, always the same ones of a stream."""
+    """Return (B, size, …) draws with replacement, always the same ones of a stream."""
     rows = np.random.default_rng(stream).integers(len(sample), size=(_RESAMPLES, size))
     return sample[rows]

@@ -118,7 +118,7 @@ def _outcome(future: Future[bytes], limit_s: float) -> Any:  # noqa: ANN401 - wh
 
 
 def _ending(code: int) -> str:
-    """How a process ended, from its exit code."""
+    """Return how a process ended, from its exit code."""
     if code < 0:
         return f"its process was ended by {signal.Signals(-code).name}"
     return f"its process ended with exit code {code}"

@@ -31,7 +31,7 @@ METADATA = b"entropy_explore_env"
 
 
 def columns(scenario: Scenario) -> list[tuple[str, pa.DataType]]:
-    """Names and types of the columns.
+    """Return the names and types of the columns.
 
     Args:
         scenario: With flat observations.

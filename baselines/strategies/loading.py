@@ -32,7 +32,7 @@ def entry_points() -> dict[str, str]:
 
 
 def module_of(name: str) -> str | Path:
-    """Where the class of a strategy is defined: a module's name, or the path of a file.
+    """Return where the class of a strategy is defined: a module's name, or the path of a file.
 
     Args:
         name: `module:Class` or `path/to/file.py:Class`.

@@ -79,13 +79,13 @@ class Results:
         return numbered
 
     def of(self, task: Task, strategy: str) -> list[Record]:
-        """(N) records of the missions of a task that were run."""
+        """Return (N) records of the missions of a task that were run."""
         return list(self.numbered(task, strategy).values())
 
     def values(
         self, task: Task, strategy: str, measure: Measure, missions: Iterable[int] | None = None
     ) -> np.ndarray:
-        """(N,) float64 a measure of each mission; its limit where the mission never came that far.
+        """Return (N,) float64 a measure of each mission; its limit where the mission never came that far.
 
         Args:
             task: Where.

@@ -111,7 +111,7 @@ def walk(name: str, channel: dict[str, Any], robot_steps: int, seed: int) -> tup
 
 
 def missions_of(scenario: Scenario) -> int:
-    """How many missions of a scenario are played at once."""
+    """Return how many missions of a scenario are played at once."""
     return min(max(_MOST_VOXELS // (scenario.grid.voxels * scenario.robots), 1), _MOST_MISSIONS)
 
 

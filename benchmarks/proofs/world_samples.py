@@ -24,7 +24,7 @@ class Sample(NamedTuple):
 
 
 def plan(rows: int = 7, columns: int = 11, seed: int = 0) -> np.ndarray:
-    """(rows, columns) uint8 shades of a plan: black walls, white floor, grey unknown."""
+    """Return (rows, columns) uint8 shades of a plan: black walls, white floor, grey unknown."""
     shades = np.random.default_rng(seed).choice([0, 205, 254, 254, 254], (rows, columns))
     return shades.astype(np.uint8)
 
@@ -69,7 +69,7 @@ def octomap_bytes(suffix: str) -> bytes:
 
 
 def points(count: int = 60) -> np.ndarray:
-    """(count, 3) float32 places."""
+    """Return (count, 3) float32 places."""
     return np.random.default_rng(1).uniform(0.0, SHAPE, (count, 3)).astype(np.float32)
 
 
@@ -117,7 +117,7 @@ def mesh(kind: str) -> bytes:
 
 
 def heights(rows: int = 11, columns: int = 7) -> np.ndarray:
-    """(rows, columns) float32 metres."""
+    """Return (rows, columns) float32 metres."""
     return np.random.default_rng(2).uniform(10.0, 14.0, (rows, columns)).astype(np.float32)
 
 

@@ -192,7 +192,7 @@ def channel_claims(records: Records) -> list[Claim]:
 
 
 def utilities(records: Records, cell: str) -> np.ndarray:
-    """(N,) bits taken from the hearers' maps, for each bit sent; 0 where nothing was sent."""
+    """Return (N,) bits taken from the hearers' maps, for each bit sent; 0 where nothing was sent."""
     return np.array([record[_UTILITY] or 0.0 for record in records[cell]])
 
 

@@ -25,7 +25,7 @@ _BORDER = (0.12, 0.47, 0.71)
 
 
 def _cell_picture(occupied: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """(Y, X, 3) cells in pale colours of their robots, walls dark; row 0 at the bottom."""
+    """Return (Y, X, 3) cells in pale colours of their robots, walls dark; row 0 at the bottom."""
     picture = np.full((*cells.shape, 3), 0.93)
     for robot in range(int(cells.max(initial=-1)) + 1):
         colour = np.array(COLOURS[robot % len(COLOURS)])
@@ -150,7 +150,7 @@ def figure_6(records: Records, variant: str, settings: str) -> Figure:
 
 
 def _borders(cells: np.ndarray) -> np.ndarray:
-    """(X, Y) bool, where two robots' cells meet, drawn wide enough to be seen; walls are no border."""
+    """Return (X, Y) bool, where two robots' cells meet, drawn wide enough to be seen; walls are no border."""
     border = np.zeros(cells.shape, bool)
     for axis in range(2):
         here, there = np.moveaxis(cells, axis, 0)[:-1], np.moveaxis(cells, axis, 0)[1:]

@@ -47,7 +47,7 @@ class Split(NamedTuple):
 
 
 def unknown_region(name: str) -> np.ndarray:
-    """(X, Y, 1) bool, the region."""
+    """Return (X, Y, 1) bool, the region."""
     region = np.zeros(SHAPE, bool)
     rows = slice(None) if name == "band" else slice(35, 86)
     region[_BAND[0] : _BAND[1], rows] = True
@@ -72,7 +72,7 @@ def split(name: str, eta: float | None) -> Split:
 
 
 def robot_cells() -> np.ndarray:
-    """(2, 2) where the robots are."""
+    """Return (2, 2) where the robots are."""
     return np.array(_ROBOTS)
 
 
@@ -85,7 +85,7 @@ def ratios() -> dict[str, Any]:
 
 
 def cost_graph(costs_per_cell: np.ndarray, length_cost: float = 0.0, by_length: bool = True) -> csr_matrix:
-    """(V, V) what steps between the cells of a plan cost, as `tessellate` has it; none past a corner.
+    """Return (V, V) what steps between the cells of a plan cost, as `tessellate` has it; none past a corner.
 
     Args:
         costs_per_cell: (X, Y, 1) float32, traversal cost of a cell; inf = impassable.

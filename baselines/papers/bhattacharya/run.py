@@ -83,7 +83,7 @@ class Run:
         return {**record_of(trace), "maps": packed(maps)}
 
     def plan(self) -> np.ndarray:
-        """(X, Y, 1) bool, occupied."""
+        """Return (X, Y, 1) bool, occupied."""
         grid = Grid((*self.shape, 1), self.cell_m)
         scenario = with_settings(find_scenario(self.world), {"grid": grid})
         return make_world(scenario, np.random.default_rng(self.seed)).occupied

@@ -112,12 +112,12 @@ def exploration_id(floor: str, variant: str, range_cells: float) -> str:
 
 
 def flying_id(world: str, strategy: str) -> str:
-    """Name of a cell of (e)."""
+    """Return the name of a cell of (e)."""
     return f"flying-{world}-{strategy}"
 
 
 def channel_id(channel: str, loss: float) -> str:
-    """Name of a cell of (f)."""
+    """Return the name of a cell of (f)."""
     return f"channel-{channel}-loss-{loss:g}"
 
 

@@ -42,12 +42,12 @@ CHANGES: dict[str, tuple[str, dict[str, Any], str]] = {
 
 
 def team_id(robots: int, burst: int, i_min_bits: float) -> str:
-    """Name of the cell with this team; a robot alone shares nothing, whatever the channel."""
+    """Return the name of the cell with this team; a robot alone shares nothing, whatever the channel."""
     return "single" if robots == 1 else f"team-{robots}-burst-{burst}-imin-{i_min_bits}"
 
 
 def alternative_id(robots: int, strategy: str) -> str:
-    """Name of the cell with another strategy and the settings of `team_id(robots, *STANDARD)`."""
+    """Return the name of the cell with another strategy and the settings of `team_id(robots, *STANDARD)`."""
     return f"single-{strategy}" if robots == 1 else f"team-{robots}-{strategy}"
 
 

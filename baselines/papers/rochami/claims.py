@@ -74,7 +74,7 @@ def all_claims(records: Records) -> list[Claim]:
 
 
 def distances(records: Records, cell: str) -> np.ndarray:
-    """(N,) metres that a robot drove on average, by seed."""
+    """Return (N,) metres that a robot drove on average, by seed."""
     return sample(records, cell, "distance_m") / sample(records, cell, "robots")
 
 
@@ -176,7 +176,7 @@ def _sharing_claims(records: Records) -> list[Claim]:
 
 
 def bits_sent(records: Records, cell: str) -> np.ndarray:
-    """(N,) megabits that a team sent, measurements and all else, by seed."""
+    """Return (N,) megabits that a team sent, measurements and all else, by seed."""
     return sample(records, cell, "bits_sent") / 1e6
 
 

@@ -95,14 +95,14 @@ CHANGES: dict[str, Change] = {
 
 
 def cell_id(robots: int, method: str, blocked: str = "wait") -> str:
-    """Name of a cell of the main experiment; a robot alone is not blocked and not coordinated."""
+    """Return the name of a cell of the main experiment; a robot alone is not blocked and not coordinated."""
     if robots == 1:
         return "n1-random" if method == "random" else "n1-rule"
     return f"n{robots}-{method}-{blocked}"
 
 
 def kappa_id(kappa: float) -> str:
-    """Name of the cell with this cost sensitivity."""
+    """Return the name of the cell with this cost sensitivity."""
     return f"kappa-{kappa:g}" if kappa > 0.0 else cell_id(2, "coordinated")
 
 
@@ -114,7 +114,7 @@ def change_id(name: str, robots: int, method: str) -> str:
 
 
 def sharing_id(robots: int, i_min_bits: float | None = None, fill: float | None = None) -> str:
-    """Name of the cell in Rocha04's room with a fixed or a steered I_min."""
+    """Return the name of the cell in Rocha04's room with a fixed or a steered I_min."""
     return f"sharing-n{robots}-" + (f"imin-{i_min_bits:g}" if fill is None else f"fill-{fill:g}")
 
 

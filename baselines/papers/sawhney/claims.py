@@ -125,7 +125,7 @@ def compared(
     teams: Sequence[int] = (),
     worlds: Sequence[str] = (),
 ) -> Interval:
-    """Time of a method over that of another, with its 95 % interval."""
+    """Return the time of a method over that of another, with its 95 % interval."""
     pair = (relative(records, part, method, end, teams, worlds) for method in (ours, theirs))
     return ratio_interval(*pair)
 

@@ -109,7 +109,7 @@ def part_of(world: str) -> str:
 
 
 def methods(part: str, quick: bool) -> dict[str, dict[str, Any]]:
-    """Name of a method → fields of ExplorationConfig."""
+    """Return each method's fields of ExplorationConfig, by its name."""
     betas = (*(QUICK_BETAS if quick else BETAS), *FARTHER_BETAS[part])
     frontiers = {"frontiers": FrontierConfig(visibility="naive")}
     found: dict[str, dict[str, Any]] = {
@@ -127,7 +127,7 @@ def methods(part: str, quick: bool) -> dict[str, dict[str, Any]]:
 
 
 def cell_id(world: str, robots: int, method: str, change: str | None = None) -> str:
-    """Name of a cell."""
+    """Return the name of a cell."""
     return f"{world}/n{robots}/{method}" + ("" if change is None else f"-{change}")
 
 

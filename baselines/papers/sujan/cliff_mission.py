@@ -39,7 +39,7 @@ START_M = (2.0625, 6.0625)
 
 
 def cell_id(method: int) -> str:
-    """Name of the cell of a method."""
+    """Return the name of the cell of a method."""
     return f"cliff-{method}"
 
 
@@ -97,7 +97,7 @@ def record_mapping(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
 
 
 def known_columns(env: EntropyExploreEnv) -> np.ndarray:
-    """(X, Y) bool, columns of the elevation map of the only rover that are known."""
+    """Return (X, Y) bool, columns of the elevation map of the only rover that are known."""
     view = view_of(env.missions, 0, 0)
     scenario = view.scenario
     sigma_min = view.kind.sensor.sigma_min
@@ -106,13 +106,13 @@ def known_columns(env: EntropyExploreEnv) -> np.ndarray:
 
 
 def plateau_of(occupied: np.ndarray) -> np.ndarray:
-    """(X, Y) bool, the highest columns of a world of columns (X, Y, Z)."""
+    """Return (X, Y) bool, the highest columns of a world of columns (X, Y, Z)."""
     heights = occupied.sum(axis=2)
     return np.asarray(heights == heights.max())
 
 
 def new_columns(records: Records, method: int) -> np.ndarray:
-    """(N, STEPS + 1) columns mapped since the first looks, after each step; at its end it stays."""
+    """Return (N, STEPS + 1) columns mapped since the first looks, after each step; at its end it stays."""
     rows = []
     for record in records[cell_id(method)]:
         counts = np.asarray(record["columns"], float)[: LOOKS + STEPS + 1]
@@ -134,7 +134,7 @@ def interest_in(records: Records, part: str, steps: int) -> np.ndarray:
 
 
 def steps_needed(records: Records) -> np.ndarray:
-    """(N,) steps of method 5 until it has mapped what method 3 has after MORE, over MORE."""
+    """Return (N,) steps of method 5 until it has mapped what method 3 has after MORE, over MORE."""
     wanted = new_columns(records, 3)[:, MORE]
     reached = new_columns(records, 5) >= wanted[:, None]
     steps = np.where(reached.any(axis=1), reached.argmax(axis=1), STEPS)

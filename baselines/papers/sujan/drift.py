@@ -95,7 +95,7 @@ class Run:
 
 
 def cell_id(strategy: str, level: str, plain: bool = False) -> str:
-    """Name of the cell of a strategy and a level; `plain`, without margin and guard."""
+    """Return the name of the cell of a strategy and a level; `plain`, without margin and guard."""
     return f"{strategy}-{level}-plain" if plain else f"{strategy}-{level}"
 
 
@@ -174,18 +174,18 @@ def _guard_claims(records: Records, strategy: str, level: str) -> list[Claim]:
 
 
 def half_times_s(records: Records, cell: str) -> np.ndarray:
-    """(N,) seconds until half of what can be seen was; the whole mission where it was not."""
+    """Return (N,) seconds until half of what can be seen was; the whole mission where it was not."""
     halves = [(record["joint"]["t50_seen_s"], record["t_mission_s"]) for record in records[cell]]
     return np.asarray([end if half is None else half for half, end in halves], float)
 
 
 def saw_half(records: Records, cell: str) -> float:
-    """Share of the missions that saw half of what can be seen."""
+    """Return the share of the missions that saw half of what can be seen."""
     return float(np.mean([record["joint"]["t50_seen_s"] is not None for record in records[cell]]))
 
 
 def error_m(records: Records, cell: str) -> np.ndarray:
-    """(N,) root mean square error of the place over each mission's scans; 0 where no robot drifts."""
+    """Return (N,) root mean square error of the place over each mission's scans; 0 where no robot drifts."""
     return np.asarray([record.get("localization", {}).get("rms_error_m", 0.0) for record in records[cell]])
 
 

@@ -99,7 +99,7 @@ class Run:
 
 
 def cell_id(count: int, reach: str, weight: float = 0.0) -> str:
-    """Name of the cell of a number of fiducials, `near` or `far`, and a weight of the error."""
+    """Return the name of the cell of a number of fiducials, `near` or `far`, and a weight of the error."""
     place = f"fiducials-{count}-{reach}" if count else "fiducials-0"
     return f"{place}-weight-{weight:g}" if weight else place
 
@@ -161,7 +161,7 @@ def all_claims(records: Records) -> list[Claim]:
 
 
 def errors_by_way(records: Records, cell: str) -> np.ndarray:
-    """(N, D) error of the place in metres after every `EVERY_M` of each mission's way, up to `WAY_M`.
+    """Return (N, D) error of the place in metres after every `EVERY_M` of each mission's way, up to `WAY_M`.
 
     Between scans it is interpolated; beyond the last one it stays.
     """
@@ -172,12 +172,12 @@ def errors_by_way(records: Records, cell: str) -> np.ndarray:
 
 
 def rms_error_m(records: Records, cell: str) -> np.ndarray:
-    """(N,) root mean square error of the place over `WAY_M` of each mission's way."""
+    """Return (N,) root mean square error of the place over `WAY_M` of each mission's way."""
     return np.asarray(np.sqrt((errors_by_way(records, cell) ** 2).mean(axis=1)))
 
 
 def time_to_map(records: Records, cell: str, share: float) -> np.ndarray:
-    """(N,) seconds until a share was mapped; where it was not, those of the whole mission."""
+    """Return (N,) seconds until a share was mapped; where it was not, those of the whole mission."""
     times = []
     for record in records[cell]:
         reached = int(np.searchsorted(np.asarray(record["mapped"]), share))

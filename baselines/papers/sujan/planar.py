@@ -93,7 +93,7 @@ class Run:
 
 
 def cell_id(robots: int, method: str) -> str:
-    """Name of the cell of a method, or of a change of method (v)."""
+    """Return the name of the cell of a method, or of a change of method (v)."""
     return f"robots-{robots}-{method}"
 
 
@@ -182,17 +182,17 @@ def by_scan(records: Records, cell: str, field: str, scans: int = SCANS) -> np.n
 
 
 def at_end(records: Records, cell: str, field: str) -> np.ndarray:
-    """(N,) a figure of each mission after its last scan."""
+    """Return (N,) a figure of each mission after its last scan."""
     return np.asarray([record[field][-1] for record in records[cell]], float)
 
 
 def mapped(records: Records, cell: str) -> np.ndarray:
-    """(N,) mean share mapped over the scans of each mission: how much is mapped for the same scans."""
+    """Return (N,) mean share mapped over the scans of each mission: how much is mapped for the same scans."""
     return np.asarray(by_scan(records, cell, "mapped")[:, 1:].mean(axis=1))
 
 
 def mapped_per_metre(records: Records, cell: str) -> np.ndarray:
-    """(N,) share mapped at the end, over the way of the team in hundreds of metres."""
+    """Return (N,) share mapped at the end, over the way of the team in hundreds of metres."""
     share, way_m = (at_end(records, cell, field) for field in ("mapped", "driven_m_by_scan"))
     return np.asarray(100.0 * share / np.maximum(way_m, 1.0))
 

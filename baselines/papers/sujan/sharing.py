@@ -99,7 +99,7 @@ def all_claims(records: Records) -> list[Claim]:
 
 
 def bits_of(records: Records, cell: str, field: str) -> np.ndarray:
-    """(N, …) a figure of each mission's map, at each threshold where it depends on that."""
+    """Return (N, …) a figure of each mission's map, at each threshold where it depends on that."""
     return np.array([record[field] for record in records[cell]], float)
 
 

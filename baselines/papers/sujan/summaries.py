@@ -89,7 +89,7 @@ class SharedMaps:
 
 
 def map_errors(env: EntropyExploreEnv) -> Record:
-    """How wrong the maps of a mission are now, over the voxels that can be seen; a voxel unknown is ½.
+    """Return how wrong the maps of a mission are now, over the voxels that can be seen; a voxel unknown is ½.
 
     Returns:
         `error`: mean |expected - true coverage| of the robots' own maps, mean over the team; `known`: share
@@ -115,12 +115,12 @@ def map_errors(env: EntropyExploreEnv) -> Record:
 
 
 def batch_id(task: str, burst: int) -> str:
-    """Name of a cell of Rocha04's batches."""
+    """Return the name of a cell of Rocha04's batches."""
     return f"{task}-batches-{burst}"
 
 
 def summary_id(task: str, every_s: float) -> str:
-    """Name of a cell of summaries."""
+    """Return the name of a cell of summaries."""
     return f"{task}-summaries-{every_s:g}"
 
 

@@ -122,7 +122,7 @@ class Planner:
         return self._functionals
 
     def path_to(self, voxel: int) -> np.ndarray:
-        """(N,) the cells of the shortest path from its robot to a voxel."""
+        """Return (N,) the cells of the shortest path from its robot to a voxel."""
         return extract_path(self.space, self.cell_costs, voxel, *self._metric)
 
     def covering_step(self, robot: int, place: int) -> int:
