@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import ModuleType
 from typing import IO
@@ -58,16 +58,16 @@ def claim(kernel: Path) -> IO[bytes] | None:
     if fcntl is None:
         return None
     until_s = time.monotonic() + _PATIENCE_S
-    with suppress(OSError):
+    with suppress(OSError), ExitStack() as opened:
         kernel.parent.mkdir(parents=True, exist_ok=True)
-        held = kernel.with_suffix(_CLAIM).open("wb")
+        held = opened.enter_context(kernel.with_suffix(_CLAIM).open("wb"))
         while time.monotonic() < until_s:
             try:
                 fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                opened.pop_all()  # it stays open
                 return held
             except BlockingIOError:
                 time.sleep(_PAUSE_S)
-        held.close()
     return None
 
 

@@ -110,6 +110,19 @@ def test_nobody_waits_for_ever_nor_where_there_are_no_locks(tmp_path, monkeypatc
     release(first)
 
 
+@needs_posix
+def test_a_file_system_without_locks_leaves_no_file_open(tmp_path, monkeypatch):
+    opened = []
+
+    def refuse(file, _):
+        opened.append(file)
+        raise OSError("No locks available")
+
+    monkeypatch.setattr(folder.fcntl, "flock", refuse)
+    assert claim(tmp_path / "a.kernel") is None
+    assert [file.closed for file in opened] == [True]
+
+
 def test_a_folder_that_cannot_be_written_is_no_matter(tmp_path):
     (tmp_path / "file").write_text("")
     release(claim(tmp_path / "file" / "a.kernel"))
