@@ -16,7 +16,7 @@ import dataclasses
 import shlex
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -57,6 +57,7 @@ from training.runs import (
     save_policy,
     save_state,
     start_from,
+    told,
 )
 from training.validation import TrainingTask, Validator, draw_best_mission, learning_seeds, validation_task
 
@@ -349,11 +350,6 @@ def finished(args: Args, state: TrainingState) -> bool:
     """Return whether all steps are done, and the last validation, too."""
     steps = state.model.num_timesteps
     return steps >= args.total_steps and state.progress.validated(steps)
-
-
-def told(changed: Mapping[str, object]) -> str:
-    """Return the end of a message about options that differ from those that a run was started with."""
-    return "".join(f"; {name} was {value}" for name, value in changed.items())
 
 
 def say_stopped(out: Path, steps: int, as_json: bool) -> int:

@@ -57,6 +57,7 @@ from training.runs import (
     resume_command,
     resumed_options,
     save_options,
+    told,
 )
 
 if TYPE_CHECKING:
@@ -110,8 +111,7 @@ def main(words: Sequence[str]) -> int:
     args = parsed(words)
     if (resume := args.resume) is not None:
         args, changed = resumed_options(Args, resume, words, _CHANGEABLE, __doc__, settled_arguments)
-        said = "".join(f"; {name} was {value}" for name, value in changed.items())
-        print(f"{resume}: {_where(resume)}{said}", file=sys.stderr)
+        print(f"{resume}: {_where(resume)}{told(changed)}", file=sys.stderr)
     named = base_task(args.scenario, args.task.settings, OWN).scenario
     args.out = args.out or Path("runs") / f"rllib-{named.name}-{args.robots}"
     if args.cost_per_s is None:

@@ -220,6 +220,11 @@ def resumed_options(
     return args, changed
 
 
+def told(changed: Mapping[str, object]) -> str:
+    """Return the end of a message about options that differ from those that a run was started with."""
+    return "".join(f"; {name} was {value}" for name, value in changed.items())
+
+
 def _flat(options: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     """Return nested options by their names on the command line, such as `channel.burst`."""
     flat: dict[str, Any] = {}
