@@ -144,7 +144,8 @@ def main(words: Sequence[str]) -> int:
     table = runs / f"{suite.name}.jsonl"
     if stop_after_s > 0.0:
         run_suite(suite, table, how, known)
-    whole = suite if args.suite is None else find_suite(suite.name, strategies=suite.strategies)
+    quick_part = args.quick and args.suite is not None
+    whole = find_suite(suite.name, strategies=suite.strategies) if quick_part else suite
     results, rows = results_of(whole, [*known, *read_table(table)])
     if not rows:
         print("nothing to write: no mission was run", file=sys.stderr)
