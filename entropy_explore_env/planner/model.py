@@ -28,6 +28,8 @@ from entropy_explore_env.viewpoints.expected_scan import ScanModel, ScanScratch,
 
 _WAYPOINTS = 64
 """Corners of the straightened path to a far place that are found at most."""
+_BATCH = 256
+"""Voxels whose marks are counted at a time."""
 _SPARE = 4
 """Viewpoints beside those of the recipe: where to go when nothing is left, and where the robot is going."""
 
@@ -58,6 +60,8 @@ class ProposalScratch(NamedTuple):
     worth: np.ndarray  # (F,) float64, what the blocks of the far places promise, the most first
     marks: np.ndarray  # (V,) uint64, zeros, which it is again afterwards: bit k = candidate k sees the voxel
     seen: np.ndarray  # (V,) int32, voxels that some candidate sees
+    batch: np.ndarray  # (_BATCH,) uint64, marks of some voxels
+    batch_shares: np.ndarray  # (_BATCH,) float64, 1/n of these voxels, each seen by n candidates
     views: np.ndarray  # (K,) VIEW
     taken: np.ndarray  # (K,) int64, numbers in the pool of the candidates
     common: np.ndarray  # (K, K) int64, voxels that both of two candidates see
@@ -116,6 +120,8 @@ def _arrays(scenario: Scenario, recipes: Sequence[Recipe]) -> dict[str, tuple[tu
         "worth": ((far,), np.float64),
         "marks": ((voxels,), np.uint64),
         "seen": ((voxels,), np.int32),
+        "batch": ((_BATCH,), np.uint64),
+        "batch_shares": ((_BATCH,), np.float64),
         "views": ((candidates,), VIEW),
         "taken": ((candidates,), np.int64),
         "common": ((candidates, candidates), np.int64),

@@ -65,7 +65,7 @@ def select(proposer, situation, size, choice, kept):
             tries, before = tries - 1, count
             count, marked = _take(proposer, situation, number, count, marked, MOST_COMMON)
             places -= int(count > before and pool[number].kind == _NEAR)
-    clear_marks(proposer, marked)
+    clear_marks(proposer, count, marked)
     return count
 
 

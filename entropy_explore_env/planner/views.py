@@ -8,7 +8,7 @@ import numpy as np
 
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.visibility import in_cone
-from entropy_explore_env.belief.voxel_index import flat_index, grid_index
+from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.planner.candidate_features import SEEN_BITS
 from entropy_explore_env.viewpoints.expected_scan import imagine_scan
@@ -32,16 +32,8 @@ def look_from(proposer, situation, at, number, most_common):
     touched = imagine_scan(situation.belief, proposer.exact, at, scratch.scan)
     view = scratch.views[number]
     _gather(proposer, situation, at, touched, view)
+    _count_common(scratch, number)
     common = scratch.common[number]
-    for other in range(number + 1):
-        common[other] = 0
-    for i in range(view.seen):
-        marks = scratch.marks[scratch.scan.touched[i]]
-        other = 0
-        while marks != 0:
-            common[other] += np.int64(marks & _ONE)
-            marks >>= _ONE
-            other += 1
     for other in range(number):
         fewer = min(view.seen, scratch.views[other].seen)
         if common[other] > most_common * fewer:
@@ -50,12 +42,36 @@ def look_from(proposer, situation, at, number, most_common):
 
 
 @lean_kernel
+def _read_batch(scratch, voxels, begin, end):
+    """Copy the marks of some voxels into one array, for vectorized sums, and return how many there are."""
+    count = min(len(scratch.batch), end - begin)
+    for i in range(count):
+        scratch.batch[i] = scratch.marks[voxels[begin + i]]
+    return count
+
+
+@lean_kernel
+def _count_common(scratch, number):
+    """Count the voxels that candidate `number`, which is not marked yet, and each one before it both see."""
+    seen, common, batch = scratch.views[number].seen, scratch.common[number], scratch.batch
+    for other in range(number + 1):
+        common[other] = 0
+    for begin in range(0, seen, len(batch)):
+        count = _read_batch(scratch, scratch.scan.touched, begin, seen)
+        for other in range(number):
+            bit, total = np.uint64(other), np.uint64(0)
+            for i in range(count):
+                total += (batch[i] >> bit) & _ONE
+            common[other] += np.int64(total)
+
+
+@lean_kernel
 def _gather(proposer, situation, at, touched, view):
     """Sum up what an imagined scan adds, and clear it; voxels that count as seen come first in `touched`."""
     scan, belief, cones = proposer.scratch.scan, situation.belief, situation.cones
     cone_bits = proposer.scratch.cone_bits
-    bits, all_bits, again_bits = 0.0, 0.0, 0.0
-    growth, all_growth, again_growth = 1.0, 1.0, 1.0
+    bits, all_bits, twice_bits = 0.0, 0.0, 0.0
+    growth, all_growth, twice_growth = 1.0, 1.0, 1.0
     seen, unknown, distance = 0, 0, 0.0
     for mate in range(len(cones)):
         cone_bits[mate] = 0.0
@@ -65,7 +81,6 @@ def _gather(proposer, situation, at, touched, view):
         share = np.float64(scan.added[voxel]) / precision
         scan.added[voxel] = 0.0
         x, y, z = grid_index(belief.size, voxel)
-        dx, dy, dz = x + 0.5 - at[0], y + 0.5 - at[1], z + 0.5 - at[2]
         left = False
         for mate in range(len(cones)):
             cone = cones[mate]
@@ -73,21 +88,21 @@ def _gather(proposer, situation, at, touched, view):
                 left = True
                 cone_bits[mate] += 0.5 * math.log2(1.0 + share)
         all_growth *= 1.0 + share
-        if not left:
-            growth *= 1.0 + share
-            again_growth *= (1.0 + 2.0 * share) / (1.0 + share)
-        if all_growth > _FOLD_ABOVE or again_growth > _FOLD_ABOVE:
+        growth *= 1.0 if left else 1.0 + share
+        twice_growth *= 1.0 if left else 1.0 + 2.0 * share
+        if all_growth > _FOLD_ABOVE or twice_growth > _FOLD_ABOVE:
             bits, all_bits = bits + math.log2(growth), all_bits + math.log2(all_growth)
-            again_bits += math.log2(again_growth)
-            growth, all_growth, again_growth = 1.0, 1.0, 1.0
+            twice_bits += math.log2(twice_growth)
+            growth, all_growth, twice_growth = 1.0, 1.0, 1.0
         if share >= _SEEN_RATIO:
+            dx, dy, dz = x + 0.5 - at[0], y + 0.5 - at[1], z + 0.5 - at[2]
             scan.touched[seen] = voxel
             seen += 1
             unknown += int(precision < proposer.exact.known_precision)
             distance += math.sqrt(dx * dx + dy * dy + dz * dz)
     view.bits = 0.5 * (bits + math.log2(growth))
     view.all_bits = 0.5 * (all_bits + math.log2(all_growth))
-    view.again_bits = 0.5 * (again_bits + math.log2(again_growth))
+    view.again_bits = 0.5 * (twice_bits + math.log2(twice_growth)) - view.bits
     view.seen, view.unknown, view.distance = seen, unknown, distance
     view.slivers, view.unique, view.announced_bits = 0, 0.0, 0.0
     for mate in range(len(cones)):
@@ -118,48 +133,51 @@ def mark_view(proposer, belief, number, marked):
 
 
 @lean_kernel
-def _is_left(belief, x, y, z, known, marks, bit):
-    """Return whether a voxel is unknown and stays so: in the workspace, and not seen by the candidate."""
-    size = belief.size
-    if not (0 <= x < size[0] and 0 <= y < size[1] and 0 <= z < size[2]):
+def _is_left(belief, voxel, known, marks, bit):
+    """Return whether a voxel is unknown and stays so: not seen by the candidate."""
+    if marks[voxel] & bit:
         return False
-    voxel = flat_index(size, x, y, z)
-    return (
-        belief.precision[voxel] < known and belief.mean[voxel] <= STOP_AT_COVERED and not marks[voxel] & bit
-    )
+    return belief.precision[voxel] < known and belief.mean[voxel] <= STOP_AT_COVERED
 
 
 @lean_kernel
 def _slivers_beside(belief, voxel, known, marks, bit):
     """Return how many of a voxel's six neighbours are left unknown though what lies behind each is not."""
-    x, y, z = grid_index(belief.size, voxel)
-    count = 0
-    for axis in range(3):
-        for side in range(2):
-            step = 2 * side - 1
-            dx = step if axis == 0 else 0
-            dy = step if axis == 1 else 0
-            dz = step if axis == 2 else 0
-            if _is_left(belief, x + dx, y + dy, z + dz, known, marks, bit):
-                behind = _is_left(belief, x + 2 * dx, y + 2 * dy, z + 2 * dz, known, marks, bit)
-                count += int(not behind)
+    at, count, stride = grid_index(belief.size, voxel), 0, 1
+    for axis in (2, 1, 0):
+        for step in (-1, 1):
+            room = at[axis] if step < 0 else belief.size[axis] - 1 - at[axis]
+            if room < 1 or not _is_left(belief, voxel + step * stride, known, marks, bit):
+                continue
+            if room < 2 or not _is_left(belief, voxel + 2 * step * stride, known, marks, bit):
+                count += 1
+        stride *= belief.size[axis]
     return count
 
 
 @lean_kernel
-def clear_marks(proposer, marked):
-    """Sum up how unique the views are, and clear the marks of all candidates."""
+def _bits_set(marks):
+    """Return how many bits of a number are set."""
+    count = 0
+    while marks != 0:
+        count += 1
+        marks &= marks - _ONE
+    return count
+
+
+@lean_kernel
+def clear_marks(proposer, count, marked):
+    """Sum up how unique the views of `count` candidates are, and clear the marks of the voxels seen."""
     scratch = proposer.scratch
+    batch, shares = scratch.batch, scratch.batch_shares
+    for begin in range(0, marked, len(batch)):
+        voxels = _read_batch(scratch, scratch.seen, begin, marked)
+        for i in range(voxels):
+            shares[i] = 1.0 / _bits_set(batch[i])
+        for number in range(count):
+            bit, unique = np.uint64(number), scratch.views[number].unique
+            for i in range(voxels):
+                unique += shares[i] * np.float64((batch[i] >> bit) & _ONE)
+            scratch.views[number].unique = unique
     for i in range(marked):
-        voxel = scratch.seen[i]
-        marks, count = scratch.marks[voxel], 0
-        while marks != 0:
-            count += 1
-            marks &= marks - _ONE
-        marks, number = scratch.marks[voxel], 0
-        while marks != 0:
-            if marks & _ONE:
-                scratch.views[number].unique += 1.0 / count
-            marks >>= _ONE
-            number += 1
-        scratch.marks[voxel] = 0
+        scratch.marks[scratch.seen[i]] = 0

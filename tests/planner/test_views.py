@@ -32,7 +32,7 @@ def test_one_ray_through_seven_unknown_voxels():
     assert proposer.scratch.common[1, 0] == 7
     assert look_from(proposer, situation, BACK, 1, 2.0)
     assert mark_view(proposer, situation.belief, 1, 7) == 7
-    clear_marks(proposer, 7)
+    clear_marks(proposer, 2, 7)
     assert [proposer.scratch.views[k]["unique"] for k in range(2)] == pytest.approx([3.5, 3.5])
     assert not proposer.scratch.marks.any() and not proposer.scratch.scan.added.any()
 
