@@ -38,7 +38,6 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.validation import check_whole
 from training import extra  # noqa: F401 - before what is not there without it
 from training.checkpoints import NotFiniteError, SilentRunnersError
-from training.ppo_options import OWN
 from training.rllib_run import (
     FIGURES,
     POLICY,
@@ -59,6 +58,7 @@ from training.runs import (
     save_options,
     told,
 )
+from training.validation import OWN
 
 if TYPE_CHECKING:
     from training.rllib_run import RunValidation

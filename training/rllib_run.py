@@ -23,8 +23,7 @@ from entropy_explore_env.writing import write_atomically
 from training.advantages import Discounting
 from training.checkpoints import PolicySettings, checkpoint_name, forget_later, save_checkpoint
 from training.policy import load_policy, panorama_form
-from training.ppo_options import OWN
-from training.validation import Validation, Validator
+from training.validation import OWN, Validation, Validator
 
 if TYPE_CHECKING:
     from training.rllib_ppo import Args

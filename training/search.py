@@ -55,8 +55,7 @@ from entropy_explore_env.settings.validation import check_whole, is_number
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.writing import write_atomically
 from training.evaluate import task_of  # which says what is missing without the extra
-from training.slope import Pairs, shrunk_slope
-from training.validation import pair_seeds
+from training.validation import OWN, pair_seeds
 
 SEARCHED = (
     "bits_log", "seconds", "kept", "spot", "far", "soonness", "again", "unique", "common", "slivers",
@@ -66,13 +65,14 @@ SEARCHED = (
 """Features whose weights are searched: not those that the logits hold already, nor those that tell left from
 right or follow from others."""
 _COLUMNS = np.array([COLUMNS[name] for name in SEARCHED])
-_LIMIT_S = 2000.0
-"""Time limit of missions: longer ones would teach little and take all the time."""
 _LEAST_SPREAD, _NO_SPREAD = 0.03, 1e-6
 _SPREAD_MISSIONS = 2
 _LAST_STEP = 0.3
 """Length of the last step, as a share of the first one's."""
 _SPREADS = "spreads"
+_OLDER = 0.5
+"""Weight of a round's pairs, relative to those of the round after it."""
+_RIDGE = 1.0
 _STOPPED = "pairs that are done are kept, those under way are run again"
 
 
@@ -146,7 +146,7 @@ def check(args: Args) -> None:
 def learned_scenario(task: str) -> Scenario:
     """Return the scenario of a task, in worlds of training and with a time limit that a search can bear."""
     scenario = task_of(task)
-    limit_s = min(scenario.ending.time_limit_s, _LIMIT_S)
+    limit_s = min(scenario.ending.time_limit_s, OWN["ending"]["time_limit_s"])
     return with_settings(scenario, {"split": "train", "ending": {"time_limit_s": limit_s}})
 
 
@@ -201,10 +201,8 @@ class Results:
 class Lead(NamedTuple):
     """A mission that is led by weights."""
 
-    name: str
-    """Of the result that it belongs to."""
-    part: int
-    """1 for w + δ, 0 for w - δ; where spreads are measured, the number of the task."""
+    name: str  # Of the result that it belongs to
+    part: int  # 1 for w + δ, 0 for w - δ; where spreads are measured, the number of the task
     scenario: Scenario
     weights: PlannerWeights
     seed: int
@@ -246,6 +244,54 @@ def spreads_in(lead: Lead) -> tuple[np.ndarray, int]:
     strategy = Spreads(lead.weights.candidates)
     run_mission(scripted_env(lead.scenario), strategy, lead.seed)
     return strategy.variances, strategy.decisions
+
+
+class Pairs(NamedTuple):
+    """Results of N pairs of missions in one task and round."""
+
+    directions: np.ndarray  # (N, S) e
+    slopes: np.ndarray  # (N,) y
+    ln_times: np.ndarray  # (N,) mean of both logarithms of seconds
+    finished: float = 1.0  # Share of the missions that were finished
+
+
+def shrunk_slope(history: Sequence[Sequence[Pairs]]) -> tuple[np.ndarray, float]:
+    """Return the slope g from the pairs of all rounds so far, of which the latest count most.
+
+    Args:
+        history: Of each round a Pairs for each task.
+
+    Returns:
+        (S,) g, shrunk towards zero as far as it is uncertain; and how long it should be without that, 0 where
+        it is no longer than chance makes it on average.
+    """
+    tasks, size = len(history[-1]), history[-1][0].directions.shape[1]
+    slope, covariance = np.zeros(size), np.zeros((size, size))
+    for task in range(tasks):
+        parts = [parts[task] for parts in history]
+        directions = np.concatenate([part.directions for part in parts])
+        slopes = np.concatenate([part.slopes for part in parts])
+        ages = np.repeat(np.arange(len(parts))[::-1], [len(part.slopes) for part in parts])
+        own, uncertain = _least_squares(directions, slopes, _OLDER**ages)
+        slope, covariance = slope + own / tasks, covariance + uncertain / tasks**2
+    variance = max(float(slope @ slope - np.trace(covariance)) / size, 0.0)
+    if variance == 0.0:
+        return np.zeros(size), 0.0
+    shrunk = variance * np.linalg.solve(variance * np.eye(size) + covariance, slope)
+    return shrunk, math.sqrt(size * variance)
+
+
+def _least_squares(
+    directions: np.ndarray, slopes: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the slope (S,) that fits best, and its covariance (S, S)."""
+    size = directions.shape[1]
+    weighted = directions.T * weights
+    inverse = np.linalg.inv(weighted @ directions + _RIDGE * np.eye(size))
+    leaves = np.eye(len(slopes)) - directions @ inverse @ weighted  # what is left over, from what there was
+    left, freedom = leaves @ slopes, float((weights[:, None] * leaves**2).sum())
+    noise = float(weights @ left**2) / max(freedom, 1e-9)
+    return inverse @ (weighted @ slopes), noise * inverse @ (weighted * weights) @ directions @ inverse
 
 
 @dataclass

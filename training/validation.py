@@ -32,6 +32,8 @@ from entropy_explore_env.settings.scenario import Scenario
 from training.candidate_network import CandidatePolicy
 from training.policy import LearnedPolicy, choose_actions, misfit
 
+OWN = {"ending": {"time_limit_s": 2000.0}}
+"""What training changes of named scenarios: longer missions would teach little and take all the time."""
 _VALIDATION, _LEARNING = 2**32, 2**63
 _PAIRS_KEY = 2
 

@@ -11,8 +11,7 @@ import pytest
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED
 from entropy_explore_env.planner.weights import read_weights
 from training import search as searching
-from training.search import SEARCHED, main, run_command
-from training.slope import Pairs, _least_squares, shrunk_slope
+from training.search import SEARCHED, Pairs, _least_squares, main, run_command, shrunk_slope
 
 SIZE = len(SEARCHED)
 TINY = "--tasks box-7x11x5:2 box-7x11x5:1 --candidates 6 --rounds 2 --pairs 3 --sigma 1.0 --seed 4 --jobs 1"
