@@ -55,12 +55,10 @@ class Amount:
     Attributes:
         quick: Fewer cells.
         seeds: Missions a cell.
-        worlds: Files of worlds that are explored as well.
     """
 
     quick: bool
     seeds: int
-    worlds: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -77,7 +75,6 @@ class Experiment:
         figures, tables, values: Name → what makes it from records; see `page.Page`.
         seeds, quick_seeds: Missions a cell, where no number is asked for.
         least_seeds: Fewest that can be judged.
-        takes_worlds: Whether files of worlds are explored as well.
     """
 
     name: str
@@ -92,25 +89,17 @@ class Experiment:
     seeds: int = 30
     quick_seeds: int = 3
     least_seeds: int = 1
-    takes_worlds: bool = False
 
-    def amount(self, quick: bool, seeds: int | None, worlds: tuple[Path, ...]) -> Amount:
+    def amount(self, quick: bool, seeds: int | None) -> Amount:
         """Return how much is run.
 
         Raises:
-            SettingError: There are too few seeds, or world files that the experiment does not take.
+            SettingError: There are too few seeds.
         """
-        if worlds and not self.takes_worlds:
-            raise SettingError("worlds", " ".join(map(str, worlds)), f"no value: {self.name} takes none")
-        for file in worlds:
-            if not file.is_file():
-                raise SettingError("worlds", str(file), "files of worlds")
-        if len({file.stem for file in worlds}) < len(worlds):
-            raise SettingError("worlds", " ".join(map(str, worlds)), "files of different names")
         chosen = (self.quick_seeds if quick else self.seeds) if seeds is None else seeds
         if chosen < self.least_seeds:
             raise SettingError("seeds", chosen, f"a whole number ≥ {self.least_seeds}")
-        return Amount(quick, chosen, worlds)
+        return Amount(quick, chosen)
 
 
 def reproduce(

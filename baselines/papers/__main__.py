@@ -37,9 +37,6 @@ class Args(TrialOptions):
     """Fewer seeds and cells."""
     seeds: int | None = None
     """Missions a cell, the same seeds in every cell; default: as many as the page says."""
-    worlds: tuple[Path, ...] = ()
-    """World files to explore as well: plans or height maps (sawhney), an OctoMap of a corridor
-    (bhattacharya)."""
     out: Path = Path("results/papers")
     """Folder for the pages, their figures and claims."""
     runs: Path = Path("results/papers/rows")
@@ -58,7 +55,7 @@ def main(words: Sequence[str]) -> int:
         raise SettingError("paper", args.paper, one_of(args.paper, [*PAPERS, "sujan"]))
     how = args.how(args.paper, args.json)
     experiments = [find_experiment(name) for name in names]
-    amounts = [each.amount(args.quick, args.seeds, args.worlds) for each in experiments]
+    amounts = [each.amount(args.quick, args.seeds) for each in experiments]
     make_folder("out", args.out)
     make_folder("runs", args.runs)
     from baselines.experiments.claims import terminal_claims

@@ -30,10 +30,8 @@ EXPERIMENT = Experiment(
         "coverage": claims.coverage_table,
         "exploration": claims.exploration_table,
         "split": claims.split_table,
-        "flying": claims.flying_table,
         "channel": claims.channel_table,
     },
     seeds=20,
     quick_seeds=5,
-    takes_worlds=True,
 )

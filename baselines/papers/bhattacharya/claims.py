@@ -16,13 +16,11 @@ from baselines.papers.bhattacharya.sweep import (
     CHANNELS,
     CONTROLS,
     FLOORS,
-    FLYING,
     LOSSES,
     RIVALS,
     channel_id,
     coverage_id,
     exploration_id,
-    flying_id,
 )
 
 STARTS = ("random", "cluster")
@@ -264,14 +262,3 @@ def channel_table(records: Records) -> str:
         rows.append([channel, *times, *(f"{utilities(records, cell).mean():.3f}" for cell in cells)])
     heads = [f"{what}, loss {loss:g}" for what in ("mean t (s)", "utility") for loss in LOSSES]
     return markdown_table(["channel", *heads], rows)
-
-
-def flying_table(records: Records) -> str:
-    """Return a table of flying teams, world by world; a sentence if there are none."""
-    names = product(("cave", "corridor"), FLYING)
-    rows = [((*name,), cell) for name in names if (cell := flying_id(*name)) in records]
-    columns = {
-        "mean t (s)": lambda cell: f"{sample(records, cell).mean():,.0f}",
-        "explored (%)": lambda cell: f"{100.0 * sample(records, cell, 'joint.explored').mean():.1f}",
-    }
-    return cells_table(["world", "strategy"], rows, columns) if rows else "None were run."

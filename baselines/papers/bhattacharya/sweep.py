@@ -1,10 +1,9 @@
-"""Bhattacharya's experiments as trials: controls, variants, plans and sensor ranges, and missions."""
+"""Bhattacharya's experiments as trials: controls, variants, plans and sensor ranges, and channels."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 from baselines.experiments.experiment import Amount
@@ -12,7 +11,6 @@ from baselines.experiments.trials import Cell, Trial, trials_of
 from baselines.papers.bhattacharya.measured import Measured
 from baselines.papers.bhattacharya.run import Run
 from baselines.papers.bhattacharya.simulation.team import Rules
-from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import find_scenario
 
@@ -34,9 +32,6 @@ VARIANTS: dict[str, dict[str, Any]] = {
 PICTURED = ("paper", "nearest-length")
 """Of (b), each in the largest plan in which it is run."""
 
-
-FLYING = ("voronoi", "voronoi-nearest", "gradient", "planned-rate")
-FLYING_LIMIT_S = 600.0
 
 CHANNELS: dict[str, dict[str, Any]] = {
     "utility-64": {"burst": 64},
@@ -111,39 +106,20 @@ def exploration_id(floor: str, variant: str, range_cells: float) -> str:
     return f"exploration-{floor}-{variant}-{range_cells:g}"
 
 
-def flying_id(world: str, strategy: str) -> str:
-    """Return the name of a cell of (e)."""
-    return f"flying-{world}-{strategy}"
-
-
 def channel_id(channel: str, loss: float) -> str:
     """Return the name of a cell of (f)."""
     return f"channel-{channel}-loss-{loss:g}"
 
 
-def mission_cells(seeds: int, corridor: Path | None) -> list[Cell]:
-    """Return the cells of all missions, (e) and (f).
-
-    Args:
-        seeds: Missions of each flying team; four times as many of each channel.
-        corridor: An OctoMap of a real corridor; None = without it.
-    """
-    cave = with_settings(
-        find_scenario("cave"), {"robots": 4, "time_limit_s": FLYING_LIMIT_S, "track_truth": True}
-    )
-    cells = [Cell(flying_id("cave", strategy), cave, strategy, seeds) for strategy in FLYING]
-    if corridor is not None:
-        changes = {"world": str(corridor), "robots": 4, "time_limit_s": FLYING_LIMIT_S, "track_truth": True}
-        robot = {"navigator": "planned", "reach_m": 3.0, "max_speed_m_s": 0.5, "acceleration_m_s2": 0.5}
-        sensor = find_scenario("office-3d").sensor
-        real = with_settings(find_scenario("room"), {**changes, "robot": robot, "sensor": sensor})
-        cells += [Cell(flying_id("corridor", strategy), real, strategy, seeds) for strategy in FLYING]
+def channel_cells(seeds: int) -> list[Cell]:
+    """Return the cells of (f), with this many missions each."""
+    cells = []
     office = find_scenario("office")
     for name, channel in CHANNELS.items():
         for loss in LOSSES:
             settings = {**channel, "i_min_bits": 0.0, "loss_probability": loss}
             scenario = with_settings(office, {"channel": settings, "time_limit_s": 1200.0})
-            cells.append(Cell(channel_id(name, loss), scenario, "voronoi-nearest", 4 * seeds))
+            cells.append(Cell(channel_id(name, loss), scenario, "voronoi-nearest", seeds))
     return cells
 
 
@@ -151,16 +127,13 @@ def experiment(amount: Amount) -> list[Trial]:
     """Return all trials.
 
     Of n seeds there are n runs of (a) for each control and kind of start, half as many small plans of (b)
-    and one of each other kind, a quarter of (e) and as many as seeds of (f), times missions of each. A quick
-    run has a fifth of small plans, and no others and no (e).
+    and one of each other kind, and about n missions of (f) for each channel. A quick run has a fifth of small
+    plans, and no others.
     """
-    if len(amount.worlds) > 1:
-        raise SettingError("worlds", " ".join(map(str, amount.worlds)), "an OctoMap of one corridor")
     small = max(1, amount.seeds // (5 if amount.quick else 2))
     runs = all_runs(amount.seeds, 0 if amount.quick else 1, small)
-    cells = mission_cells(max(1, amount.seeds // 4), amount.worlds[0] if amount.worlds else None)
-    missions = [cell for cell in cells if not (amount.quick and cell.id.startswith("flying"))]
-    return [*runs, Measured(max((run for run in runs if not run.known), key=size_of)), *trials_of(missions)]
+    missions = trials_of(channel_cells(4 * max(1, amount.seeds // 4)))
+    return [*runs, Measured(max((run for run in runs if not run.known), key=size_of)), *missions]
 
 
 def all_runs(coverage_seeds: int, plans: int, small_plans: int) -> list[Run]:

@@ -24,7 +24,7 @@ EXPERIMENT = Experiment(
         "figure-7": partial(figures.figure_shared, what="burst"),
         "figure-8": partial(figures.figure_shared, what="I_min"),
     },
-    tables={"teams": claims.teams_table, "changes": claims.changes_table},
+    tables={"teams": claims.teams_table},
     values={"cut off": cut_off},
     seeds=100,
     quick_seeds=10,

@@ -20,7 +20,6 @@ from baselines.experiments.tables import cells_table
 from baselines.papers.rocha04.sweep import (
     ALTERNATIVES,
     BURSTS,
-    CHANGES,
     I_MINS,
     STANDARD,
     TEAMS,
@@ -179,22 +178,3 @@ def teams_table(records: Records) -> str:
         ),
     }
     return cells_table(["robots", "strategy"], rows, columns)
-
-
-def changes_table(records: Records) -> str:
-    """Return mission times with one setting changed, paired with the room as it is."""
-    rows = [(("nothing",), "single"), *(((each[0],), f"change-{name}") for name, each in CHANGES.items())]
-
-    def half_s(cell: str) -> str:
-        return f"{np.median([record['half_s'] for record in records[cell] if record['half_s']]):,.0f}"
-
-    columns = {
-        "mean t (s)": _mean(records, "t_mission_s", ",.0f"),
-        "median t (s)": lambda cell: f"{np.median(sample(records, cell)):,.0f}",
-        "t over the room's": lambda cell: f"{ratio_of(records, cell, 'single'):.2f}",
-        "median half (s)": half_s,
-        "mean scans": _mean(records, "scans", ",.0f"),
-        "s a scan": lambda cell: f"{sample(records, cell).sum() / sample(records, cell, 'scans').sum():.2f}",
-        "cut off": lambda cell: sum(not record["finished"] for record in records[cell]),
-    }
-    return cells_table(["changed"], rows, columns)

@@ -19,7 +19,6 @@ EXPERIMENT = Experiment(
         "figure-6": figures.figure_6,
         "figure-7": figures.figure_7,
         "coverage": figures.figure_coverage,
-        "changes": figures.figure_changes,
         "sharing": figures.figure_sharing,
     },
     tables={"teams": claims.teams_table},

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from baselines.cli.figures import COLOURS
-from baselines.experiments.experiment import Records, ratio_of, sample
+from baselines.experiments.experiment import Records, sample
 from baselines.experiments.plots import interval_line, mean_band
 from baselines.experiments.statistics import mean_interval
 from baselines.papers.rochami.claims import (
@@ -22,16 +22,13 @@ from baselines.papers.rochami.claims import (
 )
 from baselines.papers.rochami.sweep import (
     BLOCKED,
-    CHANGES,
     COVERED,
-    FEW,
     FILLS,
     I_MINS,
     KAPPAS,
     METHODS,
     SHARING_TEAMS,
     cell_id,
-    change_id,
     kappa_id,
     sharing_id,
 )
@@ -118,29 +115,6 @@ def figure_coverage(records: Records) -> Figure:
         panels[1, column].set(xlabel="simulated time (s)", ylabel="I (1000 bits)")
     panels[0, 0].legend(frameon=False)
     figure.suptitle("What the team's cones cover, H(T), and what they cover more than once, I", fontsize=10)
-    return figure
-
-
-def figure_changes(records: Records) -> Figure:
-    """Draw coordinated over uncoordinated time with one thing changed at a time."""
-    names = [None, *(name for name in CHANGES if change_id(name, FEW[0], "coordinated") in records)]
-    figure = Figure(figsize=(9.6, 0.34 * len(names) + 1.5), layout="constrained")
-    axes = figure.subplots()
-    for number, n in enumerate(FEW):
-        for row, name in enumerate(names):
-            cells = [cell_id(n, m) if name is None else change_id(name, n, m) for m in METHODS[:2]]
-            ratio = ratio_of(records, *cells)
-            y, colour = row + 0.2 * (number - 1), COLOURS[number]
-            axes.plot([ratio.low, ratio.high], [y, y], color=colour, linewidth=1.5)
-            label = f"{n} robots" if row == 0 else None
-            axes.plot([ratio.value], [y], "o", color=colour, markersize=4, label=label)
-    axes.axvline(1.0, color="0.6", linewidth=0.8)
-    texts = ["as it is" if name is None else CHANGES[name].text for name in names]
-    axes.set_yticks(range(len(names)), texts, fontsize=8)
-    axes.invert_yaxis()
-    axes.set(xlabel="coordinated over uncoordinated mission time (mean, 95 % interval)")
-    axes.set_title("One thing changed at a time; blocked robots wait", fontsize=10)
-    axes.legend(frameon=False, fontsize=8, loc="best")
     return figure
 
 

@@ -26,10 +26,8 @@ EXPERIMENT = Experiment(
             ("curves", figures.figure_curves),
         )
     },
-    tables={"changed": claims.changed_table, "maps": claims.maps_table},
     values={"held": claims.held_of_paper},
     seeds=40,
     quick_seeds=2,
     least_seeds=2,
-    takes_worlds=True,
 )

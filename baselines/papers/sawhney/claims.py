@@ -14,17 +14,10 @@ import numpy as np
 from baselines.experiments.claims import SAME, Claim, above, below
 from baselines.experiments.experiment import Records, sample
 from baselines.experiments.statistics import Interval, ratio_interval
-from baselines.experiments.tables import markdown_table
 from baselines.papers.sawhney.sweep import (
     BETAS,
-    CHANGED_IN,
-    CHANGED_METHODS,
-    CHANGED_TEAM,
-    CHANGES,
     DEM,
     FARTHER_BETAS,
-    MAP_METHODS,
-    MAP_TEAM,
     PLANS,
     TEAMS,
     TERRAINS,
@@ -244,53 +237,6 @@ def _our_claims(records: Records, part: str) -> list[Claim]:
         paper = PAPER_SINGLE if part == "plans" and n == 1 else None
         claims.append(below(f"{part}-team-{n}", ratio, claim=f"to 95 %, β = {best}", paper=paper))
     return claims
-
-
-def changes_in(records: Records, part: str) -> dict[str, tuple[str, ...]]:
-    """Return what was changed in a part → the worlds in which it was."""
-    found = {
-        change: tuple(w for w in CHANGED_IN[part] if cell_id(w, CHANGED_TEAM, "ptv", change) in records)
-        for change in CHANGES[part]
-    }
-    return {change: worlds for change, worlds in found.items() if worlds}
-
-
-def _changed(
-    records: Records, change: str | None, method: str, worlds: Sequence[str]
-) -> tuple[np.ndarray, np.ndarray]:
-    """(N,) times to 95 % of V/t and of another method, one thing changed, over V/t's mean in each world."""
-    found: tuple[list[np.ndarray], list[np.ndarray]] = [], []
-    for world in worlds:
-        both = [
-            sample(records, cell_id(world, CHANGED_TEAM, name, change), "t95_s") for name in ("ptv", method)
-        ]
-        for values, taken in zip(found, both, strict=True):
-            values.append(taken / both[0].mean())
-    return np.concatenate(found[0]), np.concatenate(found[1])
-
-
-def changed_table(records: Records) -> str:
-    """Return V/t over the faster of β = 5 and 20 to 95 %, with one thing changed."""
-    rows = []
-    for part in PARTS:
-        changes = changes_in(records, part)
-        worlds = next(iter(changes.values()), ())
-        for change in (None, *changes) if changes else ():
-            pairs = [_changed(records, change, beta, worlds) for beta in CHANGED_METHODS[1:]]
-            ratio = ratio_interval(*min(pairs, key=lambda pair: pair[1].mean()))
-            text = "as it is" if change is None else CHANGES[part][change].text
-            rows.append([f"{PARTS[part]}, {text}", f"{ratio:.2f}"])
-    return markdown_table(["changed", "V/t over the faster β, to 95 %"], rows)
-
-
-def maps_table(records: Records) -> str:
-    """Return mean seconds to no frontier in plans from files, by method; without such plans a sentence."""
-    rows = []
-    for world in dict.fromkeys(cell.split("/")[0] for cell in records if cell.startswith("map-")):
-        cells = [cell_id(world, MAP_TEAM, method) for method in MAP_METHODS]
-        means = [f"{sample(records, cell, 't_none_s').mean():,.0f}" for cell in cells]
-        rows.append([world.removeprefix("map-"), *means])
-    return markdown_table(["plan", *MAP_METHODS], rows) if rows else "None were given."
 
 
 def held_of_paper(records: Records) -> str:

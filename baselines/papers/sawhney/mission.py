@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 
 from baselines.experiments.rows import Record
-from baselines.papers.sawhney.terrain_model import height_map, model_file
+from baselines.papers.sawhney.terrain_model import CEILING_M, model_file
 from baselines.strategies.metrics import ExplorationConfig
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -115,4 +115,4 @@ def _reached(times_s: Sequence[float], shares: Sequence[float], mark: float, lim
 @lru_cache(maxsize=1)
 def _over_model(scenario: Scenario) -> EntropyExploreEnv:
     """Return an environment over the model of real ground, kept for the next mission."""
-    return EntropyExploreEnv(scenario, world=height_map(model_file()))
+    return EntropyExploreEnv(scenario, world={"path": model_file(), "ceiling_m": CEILING_M})

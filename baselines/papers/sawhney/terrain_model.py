@@ -10,7 +10,6 @@ import io
 import tempfile
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib import cbook
@@ -39,8 +38,3 @@ def model_file() -> str:
     path = Path(_FOLDER.name) / "jacksboro.npz"
     write_atomically(path, buffer.getvalue())
     return str(path)
-
-
-def height_map(file: str) -> dict[str, Any]:
-    """Return the world of a height map, as environments take it."""
-    return {"path": file, "ceiling_m": CEILING_M}

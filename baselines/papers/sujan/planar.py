@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -22,7 +21,6 @@ from baselines.experiments.statistics import mean_interval, ratio_interval
 from baselines.experiments.tables import cells_table
 from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.strategies import make_strategy
-from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.settings.changes import with_settings
@@ -42,34 +40,11 @@ SCANS = 150
 """Of the team; the figures do not say how many the paper took."""
 OTHERS = ("random", "nearest-frontier")
 """Strategies beside the paper's, for one robot."""
-CHANGES: dict[str, tuple[str, NextBestViewConfig]] = {
-    "near": ("w_d 0.05 bits a metre instead of 0.01", NextBestViewConfig(distance_weight=0.05)),
-    "far": ("w_d 0", NextBestViewConfig(distance_weight=0.0)),
-    "half": (
-        "unknown cells at ½, not at the mean of their neighbours",
-        NextBestViewConfig(extrapolated=False),
-    ),
-    "linear": ("q in place of -q log2 q", NextBestViewConfig(measure="linear")),
-    "half-linear": (
-        "both of these",
-        NextBestViewConfig(measure="linear", extrapolated=False),
-    ),
-    "half-linear-far": (
-        "both of these, and w_d 0",
-        NextBestViewConfig(measure="linear", extrapolated=False, distance_weight=0.0),
-    ),
-    "stretched": ("eqs. 6-7 instead of eq. 8", NextBestViewConfig(measure="stretched")),
-    "interest": ("β = 0: no interest is lost", NextBestViewConfig(interest_decay=0.0)),
-    "poses": ("400 poses instead of 100", NextBestViewConfig(poses=400)),
-}
-"""Name → what is changed in method (v), and its settings; one robot."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """Runs a mission of a cell, with settings of its own for `next-best-view` where there are some."""
-
-    config: NextBestViewConfig | None = None
+    """Runs a mission of a cell."""
 
     def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
         """Run the mission.
@@ -87,32 +62,25 @@ class Run:
             mapped.extend([round(share, 5)] * missing)
             driven_m.extend([round(float(robots["distance_m"].sum()), 2)] * missing)
 
-        made = make_strategy(strategy) if self.config is None else NextBestView(self.config)
-        run_mission(env, made, seed, note)
+        run_mission(env, make_strategy(strategy), seed, note)
         return {**mission_figures(env.missions, 0), "mapped": mapped, "driven_m_by_scan": driven_m}
 
 
 def cell_id(robots: int, method: str) -> str:
-    """Return the name of the cell of a method, or of a change of method (v)."""
+    """Return the name of the cell of a method."""
     return f"robots-{robots}-{method}"
 
 
 def experiment(amount: Amount) -> list[CellTrial]:
-    """Return all missions; a quick run changes nothing in method (v) one at a time."""
+    """Return all missions."""
     seeds = amount.seeds
+    points = [(robots, *method) for robots in TEAMS for method in METHODS.items()]
+    points += [(1, strategy, strategy) for strategy in OTHERS]
     cells = [
-        _cell(robots, method, strategy, seeds, Run())
-        for robots in TEAMS
-        for method, strategy in METHODS.items()
+        Cell(cell_id(robots, method), scenario_of(robots), strategy, seeds, Run(), in_the_middle(robots))
+        for robots, method, strategy in points
     ]
-    cells += [_cell(1, strategy, strategy, seeds, Run()) for strategy in OTHERS]
-    for name, (_, config) in () if amount.quick else CHANGES.items():
-        cells.append(_cell(1, f"v-{name}", METHODS["v"], seeds, Run(config)))
     return trials_of(cells)
-
-
-def _cell(robots: int, method: str, strategy: str, starts: int, run: Run) -> Cell:
-    return Cell(cell_id(robots, method), scenario_of(robots), strategy, starts, run, in_the_middle(robots))
 
 
 def scenario_of(robots: int) -> Scenario:
@@ -215,37 +183,21 @@ def figure_scans(records: Records, robots: int) -> Figure:
     return figure
 
 
-def _columns(records: Records) -> dict[str, Callable[[str], str]]:
-    """Return what the tables show of a cell."""
+def _methods_table(records: Records) -> str:
+    """Return a table of every method and what stands beside them."""
+    rows = [((robots, f"({m}) {s}"), cell_id(robots, m)) for robots in TEAMS for m, s in METHODS.items()]
+    rows[len(METHODS) : len(METHODS)] = [((1, f"{s}, not the paper's"), cell_id(1, s)) for s in OTHERS]
 
     def mean(cell: str, field: str, form: str) -> str:
         return format(at_end(records, cell, field).mean(), form)
 
-    return {
+    columns = {
         "mean share mapped": lambda cell: f"{mean_interval(mapped(records, cell)):.3f}",
         f"share after {SCANS} scans": lambda cell: mean(cell, "mapped", ".3f"),
         "way (m)": lambda cell: mean(cell, "driven_m_by_scan", ",.0f"),
         "share a 100 m": lambda cell: f"{mean_interval(mapped_per_metre(records, cell)):.3f}",
     }
-
-
-def _methods_table(records: Records) -> str:
-    """Return a table of every method and what stands beside them."""
-    rows = [((robots, f"({m}) {s}"), cell_id(robots, m)) for robots in TEAMS for m, s in METHODS.items()]
-    rows[len(METHODS) : len(METHODS)] = [((1, f"{s}, not the paper's"), cell_id(1, s)) for s in OTHERS]
-    return cells_table(["robots", "method"], rows, _columns(records))
-
-
-def _changes_table(records: Records) -> str:
-    """Return a table of method (v) with one thing changed, and how much more it maps than it does."""
-    best = cell_id(1, "v")
-    rows = [(("nothing",), best), *(((c[0],), cell_id(1, f"v-{name}")) for name, c in CHANGES.items())]
-
-    def over_best(cell: str) -> str:
-        ratio = ratio_interval(mapped(records, cell), mapped(records, best))
-        return "1" if cell == best else f"{ratio:.2f}"
-
-    return cells_table(["changed"], rows, {**_columns(records), "mean share over (v)'s": over_best})
+    return cells_table(["robots", "method"], rows, columns)
 
 
 EXPERIMENT = Experiment(
@@ -259,6 +211,6 @@ EXPERIMENT = Experiment(
         "figure-20": partial(figure_scans, robots=1),
         "figure-22": partial(figure_scans, robots=2),
     },
-    tables={"methods": _methods_table, "changes": _changes_table},
+    tables={"methods": _methods_table},
     quick_seeds=5,
 )

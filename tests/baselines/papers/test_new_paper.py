@@ -137,14 +137,10 @@ def test_the_command_shows_a_table_and_can_be_strict(new_paper, tmp_path, capsys
         (["rocha05"], "paper = 'rocha05': expected one of rocha04"),
         (["rocha04", "--seeds", "0"], "seeds = 0: expected a whole number"),
         (["rocha04", "--jobs", "0"], "jobs = 0"),
-        (["rocha04", "--worlds", "pyproject.toml"], "no value: rocha04 takes none"),
         (["rocha04", "--rerun", "--since", "HEAD"], "since = 'HEAD': expected no value"),
         (["rocha04", "--since", "nothing"], "since = 'nothing': expected a commit"),
         (["rocha04", "--frobnicate"], "--frobnicate"),
-        (["bhattacharya", "--worlds", "nowhere.bt"], "worlds = 'nowhere.bt'"),
-        (["bhattacharya", "--worlds", "pyproject.toml", "README.md"], "an OctoMap of one corridor"),
         (["sawhney", "--seeds", "1"], "seeds = 1: expected a whole number ≥ 2"),
-        (["sawhney", "--worlds", "pyproject.toml", "./pyproject.toml"], "files of different names"),
     ],
 )
 def test_bad_input_is_one_line_and_nothing_is_run(words, said, tmp_path, capsys):

@@ -16,6 +16,4 @@ def test_the_command_writes_its_page_and_goes_on_where_it_was(tmp_path, capsys, 
     ran = run_paper("rocha04", tmp_path, capsys, "--seeds", "2")
     assert len(ran.claims) == 49 and not ran.claims["H0"]["holds"]
     assert ran.claims["H0"]["ours"] == pytest.approx(2677.3, abs=0.1)
-    assert "One thing changed" in ran.page and len(ran.rows) == 2 * len(cells_of(EXPERIMENT, 2))
-    quick = run_paper("rocha04", tmp_path / "quick", capsys, "--quick", "--seeds", "1")
-    assert "One thing changed" not in quick.page
+    assert len(ran.rows) == 2 * len(cells_of(EXPERIMENT, 2))
