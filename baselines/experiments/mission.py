@@ -167,38 +167,22 @@ def _idle_action(env: EntropyExploreEnv, agent: str) -> np.ndarray | np.int64:
     return np.zeros(space.shape, np.float32) if space.shape else np.int64(0)
 
 
-def mission_record(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
-    """Run a mission of the strategy with this name, and record what `record_mission` does."""
-    return record_mission(env, make_strategy(strategy), seed)
-
-
-def record_mission(
-    env: EntropyExploreEnv,
-    strategy: Strategy,
-    seed: int,
-    after_step: Callable[[EntropyExploreEnv], None] | None = None,
-) -> Record:
+def mission_record(env: EntropyExploreEnv, strategy: str | Strategy, seed: int) -> Record:
     """Run a mission and record what reports need of it.
 
     Args:
         env: With any settings.
-        strategy: Chooses the viewpoints.
+        strategy: What chooses the viewpoints, or its name.
         seed: Of the mission.
-        after_step: Called after the reset and after every step.
 
     Returns:
         The mission's figures; `half_s`, when the best map had lost half of H(0) - H_th; `sent_by_scan`,
         measurements sent after each of the team's scans; `apart_m`, the robots' mean distance from each
         other; and `series`: time, entropy of the best map and measurements sent so far at up to 200 moments.
     """
+    made = make_strategy(strategy) if isinstance(strategy, str) else strategy
     recorder = Recorder(env.missions)
-
-    def note(env: EntropyExploreEnv) -> None:
-        recorder.note()
-        if after_step is not None:
-            after_step(env)
-
-    run_mission(env, strategy, seed, note)
+    run_mission(env, made, seed, lambda _: recorder.note())
     figures = mission_figures(env.missions, 0)
     series = recorder.series()
     best = series.entropy_bits.min(axis=1)

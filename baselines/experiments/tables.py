@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
+import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from tabulate import tabulate
+
+_WIDEST_HEAD = 20
 
 
 def markdown_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
@@ -20,7 +23,10 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str
 
 def terminal_table(head: Sequence[str], rows: Sequence[Sequence[object]], widest: int = 60) -> str:
     """Return a table for people at a terminal; texts are wrapped, and cells stand in it as `str` has them."""
-    return tabulate(rows, head, "simple", disable_numparse=True, maxcolwidths=widest, maxheadercolwidths=20)
+    heads = [textwrap.fill(text, _WIDEST_HEAD) for text in head]
+    # Not by tabulate's maxcolwidths, which takes 1,204 for a number and fails to read it.
+    wrapped = [[textwrap.fill(str(cell), widest) for cell in row] for row in rows]
+    return tabulate(wrapped, heads, "simple", disable_numparse=True)
 
 
 def latex_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:

@@ -210,15 +210,3 @@ def visible_bits(cone, size, precision, known_precision, occlusion, marks):
                         own_growth, shared_growth = np.float64(1.0), np.float64(1.0)
     own, shared = own + math.log2(own_growth), shared + math.log2(shared_growth)
     return 0.5 * (own + shared), 0.5 * shared
-
-
-@lean_kernel
-def marked_bits(precision, known_precision, marks):
-    """Entropy that the marked voxels cover together: H(T), or a team's without one (RochaMI, eq. 9)."""
-    bits, growth = 0.0, np.float64(1.0)
-    for voxel in range(len(marks)):
-        if marks[voxel] > 0:
-            growth *= max(known_precision / precision[voxel], 1.0)
-            if growth > _FOLD_ABOVE:
-                bits, growth = bits + math.log2(growth), np.float64(1.0)
-    return 0.5 * (bits + math.log2(growth))

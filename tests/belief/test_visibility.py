@@ -16,7 +16,6 @@ from entropy_explore_env.belief.visibility import (
     in_cone,
     mark_cone,
     mark_cones,
-    marked_bits,
     visible_bits,
 )
 from entropy_explore_env.compilation.kernels import lean_kernel
@@ -96,6 +95,12 @@ def test_a_cone_that_is_wide_around_the_vertical_by_hand(side):
 KNOWN = 0.05**-2
 
 
+def marked_bits(precision, marks):
+    """Entropy that the marked voxels cover together (RochaMI, eq. 9)."""
+    ratios = KNOWN / precision[marks > 0].astype(float)
+    return 0.5 * np.log2(np.maximum(ratios, 1.0)).sum()
+
+
 def covered(cones, belief, occluded=False, size=SIZE):
     """H(C⁰), I(C⁰; T⁰), H(T⁰), H(T) and the marks of all cones, the first of which is the robot's own."""
     mean, precision = belief[0].ravel(), belief[1].ravel()
@@ -105,10 +110,10 @@ def covered(cones, belief, occluded=False, size=SIZE):
     marks = np.zeros(mean.size, np.uint8)
     for cone in mine[1:]:
         mark_cone(cone, size, occlusion, marks, 1)
-    team = marked_bits(precision, KNOWN, marks)
+    team = marked_bits(precision, marks)
     own, shared = visible_bits(mine[0], size, precision, KNOWN, occlusion, marks)
     mark_cone(mine[0], size, occlusion, marks, 1)
-    return own, shared, team, marked_bits(precision, KNOWN, marks), marks
+    return own, shared, team, marked_bits(precision, marks), marks
 
 
 def random_cone(rng, size=SIZE):
@@ -197,4 +202,3 @@ def test_bits_of_many_voxels_of_which_little_is_known_are_summed_without_overflo
     bits = 0.5 * math.log2(1e30)
     told = visible_bits(np.array([everywhere])[0], SIZE, precision, 1.0, None, marks)
     assert told == pytest.approx((385 * bits, 55 * bits), rel=1e-6)
-    assert marked_bits(precision, 1.0, marks) == pytest.approx(55 * bits, rel=1e-6)

@@ -18,7 +18,6 @@ EXPERIMENT = Experiment(
     figures={
         "figure-6": figures.figure_6,
         "figure-7": figures.figure_7,
-        "coverage": figures.figure_coverage,
         "sharing": figures.figure_sharing,
     },
     tables={"teams": claims.teams_table},

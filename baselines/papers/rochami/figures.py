@@ -1,4 +1,4 @@
-"""Figures 6 and 7 of RochaMI, and three that it lacks."""
+"""Figures 6 and 7 of RochaMI, and one of a steered I_min."""
 
 from __future__ import annotations
 
@@ -22,7 +22,6 @@ from baselines.papers.rochami.claims import (
 )
 from baselines.papers.rochami.sweep import (
     BLOCKED,
-    COVERED,
     FILLS,
     I_MINS,
     KAPPAS,
@@ -95,26 +94,6 @@ def figure_7(records: Records) -> Figure:
     bottom.axvline(0.25, color="0.8", linewidth=0.8)
     bottom.set(xlabel="κ", ylabel="t · d (s m)")
     top.set_title("Fig. 7: two coordinated robots; means, 95 % intervals; dashed: medians", fontsize=10)
-    return figure
-
-
-def figure_coverage(records: Records) -> Figure:
-    """Draw H(T) and I along the mission, for both methods: means over missions; those that ended keep 0."""
-    sizes = [n for n in COVERED if "coverage" in records[cell_id(n, "coordinated")][0]]
-    figure = Figure(figsize=(9.6, 6.0), layout="constrained")
-    panels = np.atleast_2d(figure.subplots(2, len(sizes), sharex="col", squeeze=False))
-    for column, n in enumerate(sizes):
-        last_s = max(float(np.median(sample(records, cell_id(n, m)))) for m in METHODS[:2])
-        grid = np.linspace(0.0, last_s, 60)
-        for method in METHODS[:2]:
-            found = [record["coverage"] for record in records[cell_id(n, method)]]
-            for axes, name in zip(panels[:, column], ("team_bits", "shared_bits"), strict=True):
-                curves = np.stack([np.interp(grid, c["time_s"], c[name], right=0.0) for c in found]) / 1000
-                mean_band(axes, grid, curves, color=_STYLES[method][0], label=method)
-        panels[0, column].set(title=f"{n} robots", ylabel="H(T) (1000 bits)")
-        panels[1, column].set(xlabel="simulated time (s)", ylabel="I (1000 bits)")
-    panels[0, 0].legend(frameon=False)
-    figure.suptitle("What the team's cones cover, H(T), and what they cover more than once, I", fontsize=10)
     return figure
 
 

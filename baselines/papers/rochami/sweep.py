@@ -17,8 +17,6 @@ FEW = (2, 4, 8)
 """Team sizes of quick runs, and of the table."""
 QUICK_KAPPAS = (0.25, 1.0)
 KAPPAS = (0.0, 0.0625, 0.125, 0.25, 0.375, 0.5, 0.75, 1.0)
-COVERED = (4, 8)
-"""Team sizes of which H(T) and I are followed."""
 I_MINS = (0.6215, 0.3219, 0.0291)
 FILLS = (0.15, 0.35, 0.5, 0.75, 1.0, 1.5, 3.0)
 SHARING_TEAMS = (2, 4)
@@ -64,9 +62,7 @@ def experiment(amount: Amount) -> list[CellTrial]:
         for blocked in BLOCKED:
             for method in METHODS:
                 settings = {"robots": robots, "robot": {"when_blocked": blocked}}
-                covered = robots in COVERED and blocked == "wait" and method != "random"
-                name = cell_id(robots, method, blocked)
-                cells.append(_cell(name, settings, method, starts, covered=covered))
+                cells.append(_cell(cell_id(robots, method, blocked), settings, method, starts))
         short = {"robots": robots, "robot": {"reach_m": 1.0}}
         cells.append(_cell(f"n{robots}-random-1m", short, "random", starts))
     for kappa in QUICK_KAPPAS if quick else KAPPAS[1:]:
@@ -80,7 +76,6 @@ def _cell(
     method: str,
     starts: int,
     coordination_settings: dict[str, Any] | None = None,
-    covered: bool = False,
 ) -> Cell:
     scenario = with_settings(with_settings(LAB, _BASE), settings)
     if method != "coordinated":
@@ -89,7 +84,7 @@ def _cell(
         return Cell(name, scenario, "random", starts)
     own = {"coordinated": method == "coordinated", **(coordination_settings or {})}
     strategy = "mutual-information" if method == "coordinated" else "ground-gradient"
-    return Cell(name, scenario, strategy, starts, Run(MutualInformationConfig(**own), covered))
+    return Cell(name, scenario, strategy, starts, Run(MutualInformationConfig(**own)))
 
 
 def _sharing_cells(starts: int, quick: bool) -> list[Cell]:

@@ -23,7 +23,6 @@ EXPERIMENT = Experiment(
             ("times", figures.figure_times),
             ("beta", figures.figure_beta),
             ("teams", figures.figure_teams),
-            ("curves", figures.figure_curves),
         )
     },
     values={"held": claims.held_of_paper},

@@ -25,7 +25,6 @@ from baselines.papers.sawhney.claims import (
     worlds_in,
 )
 from baselines.papers.sawhney.sweep import cell_id
-from entropy_explore_env.errors import counted
 
 
 def figure_beta(records: Records, part: str) -> Figure:
@@ -115,22 +114,4 @@ def figure_teams(records: Records, part: str) -> Figure:
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
     dotted = f"dotted: the paper's synchronous allocation ({paper:.2f})"
     figure.suptitle(f"{PARTS[part]}, by team size; {dotted}", fontsize=10)
-    return figure
-
-
-def figure_curves(records: Records, part: str) -> Figure:
-    """Draw explored share over time of one mission each of V/t and the best β, in every world (seed 0)."""
-    worlds = worlds_in(records, part)
-    best, n = best_beta(records, part, "t95_s"), teams_in(records, part)[-1]
-    figure = Figure(figsize=(2.5 * len(worlds), 2.6), layout="constrained")
-    panels = figure.subplots(1, len(worlds), sharey=True, squeeze=False)[0]
-    for axes, world in zip(panels, worlds, strict=True):
-        for number, method in enumerate(("ptv", f"beta-{best}", "sync")):
-            series = records[cell_id(world, n, method)][0]["series"]
-            label = {"ptv": "V/t", "sync": "V/t, synchronous"}.get(method, f"β = {best}")
-            axes.step(series["time_s"], series["explored"], where="post", color=COLOURS[number], label=label)
-        axes.set(xlabel="simulated time (s)", title=world)
-    panels[0].set_ylabel("explored")
-    panels[0].legend(frameon=False, fontsize=7, loc="lower right")
-    figure.suptitle(f"{PARTS[part]}: a mission of {counted(n, 'robot')} (seed 0)", fontsize=10)
     return figure

@@ -25,7 +25,6 @@ from entropy_explore_env.settings.scenario import Scenario
 
 MARKS = (0.5, 0.9, 0.95, 0.99)
 """Explored shares at which the time is taken."""
-_POINTS = 60
 _KEPT = ("seed", "scans", "distance_m", "blocked_moves", "robots")
 
 
@@ -46,8 +45,7 @@ class Run:
 
         Returns:
             `t50_s`, `t90_s`, `t95_s`, `t99_s`, `t_none_s`: when so much was explored, and when no frontier
-            was left; the time limit where that never happened; `finished`: whether none was left; `t_env_s`;
-            `series`: time and explored share; and counts.
+            was left; the time limit where that never happened; `finished`: whether none was left; and counts.
         """
         del strategy
         env = _over_model(env.scenario) if self.over_model else env
@@ -57,17 +55,12 @@ class Run:
         limit_s = env.scenario.ending.time_limit_s
         finished, end_s = all(explorer.idle), times_s[-1]
         reached = {f"t{100 * mark:.0f}_s": _reached(times_s, shares, mark, limit_s) for mark in MARKS}
-        rows = np.unique(np.linspace(0, len(times_s) - 1, _POINTS).round().astype(int))
         return {
             **{name: figures[name] for name in _KEPT},
             **reached,
             "t_none_s": round(float(end_s), 3) if finished else limit_s,
             "finished": finished,
             "explored": round(float(shares[-1]), 5),
-            "series": {
-                "time_s": np.round(np.asarray(times_s)[rows], 2).tolist(),
-                "explored": np.round(np.asarray(shares)[rows], 4).tolist(),
-            },
         }
 
 

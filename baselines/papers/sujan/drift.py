@@ -73,25 +73,9 @@ class Run:
     guarded: bool = True
 
     def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
-        """Run the mission.
-
-        Returns:
-            The mission's figures, and `most_blocked`, the most drives in a row that something ended early.
-        """
-        blocked_before = in_a_row = most = scans_before = 0
-
-        def note(env: EntropyExploreEnv) -> None:
-            nonlocal blocked_before, in_a_row, most, scans_before
-            robots = env.missions.state.robots[0]
-            blocked, scans = int(robots["blocked_moves"].sum()), int(robots["scans"].sum())
-            if blocked > blocked_before:
-                in_a_row += blocked - blocked_before
-            elif scans > scans_before:
-                in_a_row = 0
-            most, blocked_before, scans_before = max(most, in_a_row), blocked, scans
-
-        run_mission(env, make_strategy(strategy), seed, note, backs_off=self.guarded)
-        return {**mission_figures(env.missions, 0, floor=False), "most_blocked": most}
+        """Run the mission, and return its figures."""
+        run_mission(env, make_strategy(strategy), seed, backs_off=self.guarded)
+        return mission_figures(env.missions, 0, floor=False)
 
 
 def cell_id(strategy: str, level: str, plain: bool = False) -> str:

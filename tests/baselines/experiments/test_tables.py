@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from baselines.experiments.tables import csv_table, markdown_table
+from baselines.experiments.tables import csv_table, markdown_table, terminal_table
 
 
 def test_columns_become_csv():
@@ -22,3 +22,14 @@ def test_rows_become_markdown_as_they_are():
     )
     wide = markdown_table(["a", "b"], [["1,234.50", ""], ["  x", "1e5"]]).splitlines()
     assert wide[2:] == ["| 1,234.50 |  |", "|   x | 1e5 |"]
+
+
+def test_a_table_for_the_terminal_wraps_texts_and_leaves_numbers_as_they_are():
+    lines = terminal_table(["a", "b"], [["198,700", "x y z"], [1, "1,204 (1,138 … 1,274)"]], 12).splitlines()
+    assert [line.split() for line in lines] == [
+        ["a", "b"],
+        ["-------", "------------"],
+        ["198,700", "x", "y", "z"],
+        ["1", "1,204", "(1,138"],
+        ["…", "1,274)"],
+    ]

@@ -1,4 +1,4 @@
-"""RochaMI: its cells, claims, coverage and page."""
+"""RochaMI: its claims and page."""
 
 from __future__ import annotations
 
@@ -7,27 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from baselines.experiments.mission import scripted
 from baselines.experiments.rows import Record
 from baselines.papers.rochami import EXPERIMENT, sweep
 from baselines.papers.rochami.claims import all_claims, steered_ratio
-from baselines.papers.rochami.mission import TeamCoverage
 from baselines.papers.rochami.sweep import (
     cell_id,
     kappa_id,
     sharing_id,
 )
-from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import BOX
 from tests.baselines.papers.pages import cells_of, run_paper
-from tests.reference import rochami as reference
-from tests.reference.scenes import as_reference
-
-# --- the cells
-
-
-# --- claims
 
 
 def as_the_paper_says(starts=20) -> dict[str, list[Record]]:
@@ -102,35 +92,6 @@ def test_a_claim_fails_where_its_cell_says_otherwise(cell, factor, broken):
 def test_a_steered_i_min_is_read_between_its_fills():
     (ratio, low, high), where = steered_ratio(PAPER, 2, 0.3219)  # 2 Mbit: 160 s over 210 s
     assert ratio == pytest.approx(160 / 210) and low <= ratio <= high and where == "2.00 Mbit"
-
-
-# --- coverage
-
-
-def test_the_team_s_coverage_is_that_of_the_reference():
-    env = EntropyExploreEnv(scripted(with_settings(BOX, {"robots": 3})))
-    env.reset(seed=3)
-    coverage, rng = TeamCoverage(env.missions), np.random.default_rng(0)
-    for _ in range(12):
-        env.step({agent: rng.uniform(-1, 1, 5).astype(np.float32) for agent in env.agents})
-        coverage.note(env)
-    robots = env.missions.state.robots[0]
-    best = int(robots["entropy_bits"].argmin())
-    beliefs = as_reference(env.missions.mean[0, best], env.missions.precision[0, best])
-    sigma, covered, twice = env.scenario.ending.sigma_end, set(), 0.0
-    for robot in robots:
-        place = robot["target"][:3] / 0.5
-        cone = reference.Cone(place, *robot["target"][3:], robot["depth_m"] / 0.5, robot["half_angle_rad"])
-        seen = reference.visible(cone, beliefs, (7, 11, 5))
-        twice += reference.covered_bits(seen & covered, beliefs, sigma)
-        covered |= seen
-    series = coverage.series()
-    assert series["team_bits"][-1] == pytest.approx(
-        reference.covered_bits(covered, beliefs, sigma), rel=1e-3, abs=0.1
-    )
-    assert series["shared_bits"][-1] == pytest.approx(twice, rel=1e-3, abs=0.1)
-    assert series["time_s"][-1] == pytest.approx(env.missions.state.missions[0]["time_s"], abs=0.01)
-    assert max(series["team_bits"]) > 0.0
 
 
 # --- the command, from end to end, in a tiny box

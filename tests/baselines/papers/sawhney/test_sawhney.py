@@ -35,7 +35,6 @@ def synthetic(values, seeds=6):
                     "scans": 10,
                     "distance_m": time_s,
                     "robots": 1,
-                    "series": {"time_s": [0.0, 50.0, time_s], "explored": [0.0, 0.5, 1.0]},
                 }
             )
     return records
