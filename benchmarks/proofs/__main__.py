@@ -15,17 +15,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
-from jinja2 import Environment, FileSystemLoader
-
 from baselines.cli.arguments import make_folder, parse, run_command
 from baselines.cli.options import Mark
 from baselines.experiments.origin import this_origin
+from baselines.experiments.page import Page
 from baselines.experiments.tables import markdown_table
 from benchmarks.proofs import determinism, files, kills, settings, soak, states, training
 from benchmarks.proofs.cases import Found, play_cases
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.validation import check_whole
-from entropy_explore_env.writing import write_atomically
 
 FAILED = 1
 _SHOWN = 20
@@ -96,7 +94,7 @@ def main(words: Sequence[str]) -> int:
     played = {name: _play_all(name, args) for name in args.names or PROOFS}
     print(table(played))
     if args.out is not None:
-        write_atomically(args.out, page(played, words))
+        write_page(args.out, played, words)
     return FAILED if any(each.failed for each in played.values()) else 0
 
 
@@ -117,8 +115,8 @@ def checked(args: Args) -> Args:
     if not args.limit_s > 0.0:
         raise SettingError("limit_s", args.limit_s, "a number > 0")
     if args.out is not None:
-        if args.out.is_dir():
-            raise SettingError("out", str(args.out), "a file, and this is a folder")
+        if args.out.is_dir() or args.out.suffix != ".md":
+            raise SettingError("out", str(args.out), "a Markdown file, .md, and no folder")
         make_folder("out", args.out.absolute().parent)
     return args
 
@@ -172,26 +170,22 @@ def told(found: Sequence[Found]) -> str:
     )
 
 
-def page(played: dict[str, Played], words: Sequence[str]) -> str:
-    """Return the page of results; its text is in `page.md.j2`."""
-    folder = Path(__file__).parent
+def write_page(out: Path, played: dict[str, Played], words: Sequence[str]) -> None:
+    """Write the page of results; its text is in `page.md.j2`."""
     failures = [
         (again(name, number), said)
         for name, each in played.items()
         for number, said in list(each.failed.items())[:_SHOWN]
     ]
     origin = this_origin()
-    return (
-        Environment(loader=FileSystemLoader(folder), keep_trailing_newline=True)
-        .get_template("page.md.j2")
-        .render(
-            command=" ".join(["python -m benchmarks.proofs", *words]),
-            commit=f"{origin.commit}{'' if origin.clean else ' with changes'}",
-            versions=", ".join(f"{name} {version}" for name, version in origin.versions.items()),
-            failures=failures,
-            table=table(played),
-        )
-    )
+    texts = {
+        "command": " ".join(["python -m benchmarks.proofs", *words]),
+        "commit": f"{origin.commit}{'' if origin.clean else ' with changes'}",
+        "versions": ", ".join(f"{name} {version}" for name, version in origin.versions.items()),
+        "failures": failures,
+        "played": table(played),
+    }
+    Page(Path(__file__).with_name("page.md.j2"), texts=texts).write(out.parent, out.stem)
 
 
 if __name__ == "__main__":

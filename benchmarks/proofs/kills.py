@@ -1,8 +1,7 @@
-"""Sweeps and trainers killed at drawn moments: nothing that was done is lost, and results are the same bytes.
+"""Sweeps killed at drawn moments: nothing that was done is lost, and results are the same bytes.
 
 A sweep is killed several times before its last mission, and then ends; everything that it writes, except
-times on the clock, is compared with the files of an undisturbed one. A trainer that only writes checkpoints
-is killed while it does; the latest one that is found has to be whole, and no older than the last one written.
+times on the clock, is compared with the files of an undisturbed one.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from pathlib import Path
 from benchmarks.proofs.cases import BrokenPromiseError, Found
 
 KILLS = 10
-"""Of a sweep and of a trainer, in a case."""
+"""Of a sweep, in a case."""
 _SWEEP = ("--scenarios", "box-7x11x5", "--robots", "1,2", "--time-limit-s", "150")
 _WORDS = (*_SWEEP, "--strategies", "gradient", "--seeds", "6", "--jobs", "1")
 _MISSIONS = 24
@@ -32,16 +31,14 @@ _WAIT_S = 300.0
 
 
 def play(number: int) -> Found:
-    """Kill a sweep and a trainer, each KILLS times.
+    """Kill a sweep KILLS times.
 
     Raises:
         BrokenPromiseError: Something was lost, or came out otherwise.
     """
     with tempfile.TemporaryDirectory() as folder:
-        moments = random.Random(number)
-        kill_sweep(Path(folder) / "sweep", moments)
-        written = kill_trainer(Path(folder) / "trainer", moments)
-    return Found({"kills of sweeps": KILLS, "kills of trainers": KILLS, "checkpoints written": written})
+        kill_sweep(Path(folder), random.Random(number))
+    return Found({"kills": KILLS})
 
 
 def kill_sweep(folder: Path, moments: random.Random) -> list[int]:
@@ -104,47 +101,6 @@ def _without_clock(path: Path) -> bytes:
     for mission in missions:
         mission["record"].pop("clock", None)  # what failed has none
     return json.dumps(missions).encode()
-
-
-def kill_trainer(folder: Path, moments: random.Random) -> int:
-    """Kill a process that writes checkpoints; returns how many were written.
-
-    After each it writes the number of the checkpoint into the file `told`.
-    """
-    from training.checkpoints import latest_checkpoint, load_checkpoint
-
-    folder.mkdir()
-    told = folder.with_name("told")
-    told.write_text("0")
-    for _ in range(KILLS):
-        before = int(told.read_text())
-        child = _start(lambda before=before: _write_checkpoints(folder, told, before))
-        _until(lambda before=before: int(told.read_text() or 0) > before, child)
-        time.sleep(moments.uniform(0.0, 0.1))
-        _kill(child)
-        least = int(told.read_text() or before + 1)
-        steps = load_checkpoint(latest_checkpoint(folder, "step"), training=True).progress["steps"]
-        if steps < least:
-            raise BrokenPromiseError(f"checkpoint {least} was written, and the latest found is {steps}")
-        told.write_text(str(steps))
-    return int(told.read_text())
-
-
-def _write_checkpoints(folder: Path, told: Path, before: int) -> None:
-    import torch
-
-    from entropy_explore_env.settings.scenarios import BOX
-    from training import checkpoints
-    from training.checkpoints import Checkpoint, PolicySettings, TrainerState
-
-    steps = before
-    while True:
-        steps += 1
-        weights = {"layer": torch.full((100, 100), float(steps))}
-        state = TrainerState({"moments": torch.full((1000,), float(steps))}, {}, {"steps": steps})
-        kept = Checkpoint(PolicySettings(BOX), {"steps": steps}, weights, {}, state)
-        checkpoints.save_checkpoint(folder / checkpoints.checkpoint_name("step", steps), kept)
-        told.write_text(str(steps))
 
 
 def _start(work: Callable[[], None]) -> int:

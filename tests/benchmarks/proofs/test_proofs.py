@@ -8,7 +8,7 @@ import pytest
 
 from baselines.cli.arguments import run_command
 from benchmarks.proofs import __main__ as command
-from benchmarks.proofs.__main__ import PROOFS, Args, Played, Proof, checked, main, page, table
+from benchmarks.proofs.__main__ import PROOFS, Args, Played, Proof, checked, main, table, write_page
 from benchmarks.proofs.cases import Found, play_cases
 from entropy_explore_env.errors import SettingError
 
@@ -65,8 +65,9 @@ def test_groups_have_rows_of_their_own():
     ]
 
 
-def test_the_page_says_what_each_proof_is():
-    text = page({"squares": Played(1, [squares(1)], {})}, ["--full"])
+def test_the_page_says_what_each_proof_is(tmp_path):
+    write_page(tmp_path / "page.md", {"squares": Played(1, [squares(1)], {})}, ["--full"])
+    text = (tmp_path / "page.md").read_text("utf-8")
     assert all(f"- **{name}**: " in text for name in PROOFS)
     assert len(text.split()) < 1500
 
@@ -80,7 +81,8 @@ def test_bad_input_is_refused_before_anything_is_played(tmp_path):
         (Args(first=-1), "first = -1: expected a whole number ≥ 0"),
         (Args(limit_s=0.0), "limit_s = 0.0: expected a number > 0"),
         (Args(limit_s=float("nan")), "limit_s = nan"),
-        (Args(out=tmp_path), "a file, and this is a folder"),
+        (Args(out=tmp_path), "a Markdown file, .md, and no folder"),
+        (Args(out=tmp_path / "page.txt"), "a Markdown file, .md, and no folder"),
         (Args(out=tmp_path / "file" / "page.md"), "a folder that can be made"),
     ):
         with pytest.raises(SettingError) as error:
