@@ -143,6 +143,7 @@ def promised_around(blocks, i, j, k):
 def fill_remaining(belief, target_precision, blocks):
     """Fill in the remaining bits of all blocks of a belief, and return their sum."""
     shape, edge, size, total = blocks.bits.shape, blocks.edge, belief.size, 0.0
+    latest, ratio = np.float32(0.0), 1.0  # most voxels have the prior's precision: it is divided by once
     for i in range(shape[0]):
         for j in range(shape[1]):
             for k in range(shape[2]):
@@ -153,7 +154,9 @@ def fill_remaining(belief, target_precision, blocks):
                             voxel = flat_index(size, x, y, z)
                             precision = belief.precision[voxel]
                             if precision < target_precision and belief.mean[voxel] <= STOP_AT_COVERED:
-                                growth *= target_precision / precision
+                                if precision != latest:
+                                    latest, ratio = precision, target_precision / precision
+                                growth *= ratio
                                 if growth > _FOLD_ABOVE:
                                     bits += math.log2(growth)
                                     growth = 1.0

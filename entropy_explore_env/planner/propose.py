@@ -46,8 +46,8 @@ def propose(proposer, situation, candidates, described):
         _keep_target(proposer, situation, kept)
         if pool[choice].value <= KEEP_GOAL * pool[kept].value:
             choice = kept
-    mark_cones(situation.cones, belief.size, scratch.scan.left, 0)
     count = select(proposer, situation, size, choice, kept)
+    mark_cones(situation.cones, belief.size, scratch.scan.left, 0)
     remaining = 0.0
     if described:
         remaining = fill_remaining(belief, proposer.target_precision, proposer.blocks)

@@ -81,12 +81,12 @@ def _gather(proposer, situation, at, touched, view):
         share = np.float64(scan.added[voxel]) / precision
         scan.added[voxel] = 0.0
         x, y, z = grid_index(belief.size, voxel)
-        left = False
-        for mate in range(len(cones)):
-            cone = cones[mate]
-            if in_cone(cone, x + 0.5 - cone.apex[0], y + 0.5 - cone.apex[1], z + 0.5 - cone.apex[2]):
-                left = True
-                cone_bits[mate] += 0.5 * math.log2(1.0 + share)
+        left = scan.left[voxel] != 0
+        if left:
+            for mate in range(len(cones)):
+                cone = cones[mate]
+                if in_cone(cone, x + 0.5 - cone.apex[0], y + 0.5 - cone.apex[1], z + 0.5 - cone.apex[2]):
+                    cone_bits[mate] += 0.5 * math.log2(1.0 + share)
         all_growth *= 1.0 + share
         growth *= 1.0 if left else 1.0 + share
         twice_growth *= 1.0 if left else 1.0 + 2.0 * share
