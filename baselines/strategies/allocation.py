@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from baselines.strategies.metrics import Value
+from baselines.strategies.metrics import ExplorationConfig
 from baselines.strategies.rules.coordinated_frontier import taken
 from entropy_explore_env.frontiers.knowledge import centres_of, stays, under_way, voxel_of
 from entropy_explore_env.planner.scene import Scene
@@ -47,10 +47,10 @@ class Choice:
 class Allocator:
     """Allocates the candidates of one robot's map, at one of its decisions."""
 
-    def __init__(self, scene: Scene, value: Value) -> None:
-        """Take what the robot knows, and the metric."""
+    def __init__(self, scene: Scene, config: ExplorationConfig) -> None:
+        """Take what the robot knows, and the settings."""
         self._view, self._candidates, self._paths = scene.view, scene.cells, scene.paths
-        self._centres, self._grid, self._value = scene.centres, scene.view.scenario.grid, value
+        self._centres, self._grid, self._config = scene.centres, scene.view.scenario.grid, config
         self._lengths: dict[int, np.ndarray] = {}
         """Robot → (V,) lengths of its paths to all voxels, in voxel edges."""
 
@@ -110,7 +110,7 @@ class Allocator:
 
         def worth(seen: np.ndarray, which: np.ndarray) -> np.ndarray:
             options = seen * self._candidates.point, seconds[which], edges[which], takes[which]
-            return np.where(seen > 0.0, self._value(*options), -np.inf)
+            return np.where(seen > 0.0, self._config.values(*options), -np.inf)
 
         value = self._candidates.worths(voxels, worth)
         best = int(np.argmax(value))

@@ -110,6 +110,7 @@ class FrontierMap(ABC):
         self._counter = new_counter(points, self._size)
         self._bounds = np.full(len(self._costs), np.inf)
         """(V,) float64, upper bounds of V·(height factor) in voxels; inf = unknown."""
+        self._has_bounds = False
         self.body_reach = self._blocks.reach
 
     @property
@@ -126,7 +127,7 @@ class FrontierMap(ABC):
         self.changed = int(self._read(view.mean.reshape(-1), view.precision.reshape(-1), levels))
         opened = self._states.opened[: self._states.opened_count[0]]
         self._states.opened_count[0] = 0
-        if len(opened):
+        if len(opened) and self._has_bounds:
             counted = np.flatnonzero(np.isfinite(self._bounds)).astype(np.int32)
             forget_in_range(self._size, opened, counted, self._sight, self._bounds)
 
@@ -172,6 +173,7 @@ class FrontierMap(ABC):
     def count(self, voxels: np.ndarray) -> np.ndarray:
         """Return (K,) V·(height factor): points expected to be seen, weighted by promises."""
         self._bounds[voxels], weighed = self._counted(voxels)
+        self._has_bounds = True
         return weighed
 
     def _counted(self, voxels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -36,6 +36,7 @@ from entropy_explore_env.frontiers.visibility import (
 )
 from entropy_explore_env.frontiers.voxel_map import (
     body_footprint,
+    collect_candidates,
     count_connected,
     fill_nearest,
     first_viewing_place,
@@ -176,8 +177,9 @@ class VoxelFrontiers(FrontierMap):
         Returns:
             (K,) int32 voxels and (K,) float64 lengths in voxel edges, in the order of the blocks.
         """
-        cells = np.flatnonzero(self._marks & CANDIDATE).astype(np.int32)
-        of_block = np.ravel_multi_index((self._axes_of(cells) // self._blocks.across).T, self._blocks.blocks)
+        cells, of_block = np.empty((2, len(self._marks)), np.int32)
+        count = collect_candidates(self._blocks, cells, of_block)
+        cells, of_block = cells[:count], of_block[:count]
         lengths, nearest = lengths_to(cells), np.full(len(self._voxels), NONE)
         fill_nearest(lengths, of_block, reach, nearest)
         nearest = nearest[nearest != NONE]

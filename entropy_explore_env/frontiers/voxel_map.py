@@ -16,6 +16,7 @@ from entropy_explore_env.belief.raycast import OPEN, Line, cast_range
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.frontiers.blocks import (
+    CANDIDATE,
     COVERED,
     DROPPED,
     EDGE,
@@ -91,6 +92,24 @@ def _may_stand(blocks, x, y, z):
         if near == NONE or blocks.state[near] & (UNMAPPED | COVERED):
             return False
     return True
+
+
+@lean_kernel
+def collect_candidates(blocks, cells, of_block):
+    """Fill (V,) int32 with the frontier cells, block by block, and with their blocks; return how many."""
+    count = 0
+    for block in range(len(blocks.candidate)):
+        if blocks.candidate[block] == NONE:
+            continue
+        low, high = block_span(blocks, block)
+        for x in range(low[0], high[0]):
+            for y in range(low[1], high[1]):
+                for z in range(low[2], high[2]):
+                    cell = flat_index(blocks.size, x, y, z)
+                    if blocks.flags[cell] & CANDIDATE:
+                        cells[count], of_block[count] = cell, block
+                        count += 1
+    return count
 
 
 @lean_kernel

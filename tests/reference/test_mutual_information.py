@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from baselines.strategies.mutual_information.candidates import MATE, Body, Factors, Team, best_candidate
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cone
-from entropy_explore_env.viewpoints.gradient_candidates import CANDIDATE, find_gradient_candidates
+from entropy_explore_env.viewpoints.gradient_candidates import gradient_candidates
 from tests.reference import rochami
 from tests.reference.scenes import as_reference, drawn, random_belief, ray_space, seeds
 
@@ -25,11 +25,9 @@ OUR_BALL = np.zeros((1, 3), np.int64)
 def ours(belief, position, radius, cone, mates, weights, planar, ranked=None):
     """Candidates, and which is the best."""
     mean, precision = belief
-    candidates = np.zeros(mean.size, CANDIDATE)
-    layer = int(position[2]) if planar else -1
+    layer = int(position[2]) if planar else None
     known = weights.sigma_known**-2
-    count = find_gradient_candidates(precision, known, np.asarray(position), radius, layer, candidates)
-    candidates = candidates[:count]
+    candidates = gradient_candidates(precision, known, np.asarray(position), radius, layer)
     marks = np.zeros(mean.size, np.uint8)
     heard = np.zeros(len(mates), MATE)
     for place, mate in enumerate(mates):
@@ -38,7 +36,7 @@ def ours(belief, position, radius, cone, mates, weights, planar, ranked=None):
         if mate.cone is not None:
             c = mate.cone
             mark_cone(_cone(c.apex, c.yaw, c.pitch, c.radius, c.half_angle), SIZE, None, marks, 1)
-    if count == 0:
+    if len(candidates) == 0:
         return candidates, -1
     factors = Factors(weights.kappa, weights.scale_bits, weights.interference, True, known)
     most = candidates["steepness"] / candidates["steepness"].max()

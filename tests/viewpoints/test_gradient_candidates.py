@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from baselines.strategies.rules import gradient
 from entropy_explore_env.belief.fields import entropy_gradient
 from entropy_explore_env.missions.view import read_only
-from entropy_explore_env.viewpoints.gradient_candidates import steepest_viewpoint
 from tests.reference import rocha04
 from tests.reference.scenes import (
     SHAPES,
@@ -23,20 +23,18 @@ from tests.reference.scenes import (
 
 SIZE = (7, 11, 5)
 MIDDLE = (3.5, 5.5, 2.5)
-UNTOUCHED = 7.0
 
 
 def steepest(mean, precision, position, reach, yaw=0.0, pitch=0.0, projected=False):
     """The chosen voxel and gaze (yaw, pitch), or None where there is no choice."""
-    viewpoint = np.full(5, UNTOUCHED)
     arrays = (read_only(np.ascontiguousarray(a, np.float32)) for a in (mean, precision))
-    place = np.asarray(position, np.float64)
-    if not steepest_viewpoint(*arrays, place, yaw, pitch, float(reach), projected, viewpoint):
-        assert (viewpoint == UNTOUCHED).all()
+    place, gaze = np.asarray(position, np.float64), np.array([yaw, pitch])
+    found = gradient.steepest(*arrays, place, gaze, float(reach), projected)
+    if found is None:
         return None
-    voxel = np.floor(viewpoint[:3])
-    np.testing.assert_array_equal(viewpoint[:3], voxel + 0.5)
-    return tuple(voxel.astype(int).tolist()), tuple(viewpoint[3:].tolist())
+    voxel = np.floor(found[0])
+    np.testing.assert_array_equal(found[0], voxel + 0.5)
+    return tuple(voxel.astype(int).tolist()), found[1]
 
 
 def slope(along_x=0.0, along_y=0.0, along_z=0.0, size=SIZE):

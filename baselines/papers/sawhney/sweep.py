@@ -13,7 +13,7 @@ from typing import Any
 from baselines.experiments.experiment import Amount
 from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.papers.sawhney.mission import Run
-from baselines.strategies.metrics import Coordinated, ExplorationConfig, Metric, Nearest
+from baselines.strategies.metrics import ExplorationConfig
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario
@@ -66,11 +66,11 @@ def methods(part: str, quick: bool) -> dict[str, dict[str, Any]]:
     found: dict[str, dict[str, Any]] = {
         "ptv": {},
         "sync": {"allocation": "synchronous"},
-        **{f"beta-{beta}": {"metric": Metric(beta * POINT[part])} for beta in betas},
+        **{f"beta-{beta}": {"beta": beta * POINT[part]} for beta in betas},
         "naive": frontiers,
-        "finish": {"metric": Metric(bonus=BONUS[part])},
-        "nearest": {"metric": Nearest(), "promises": False},
-        "coordinated": {"metric": Coordinated()},
+        "finish": {"bonus": BONUS[part]},
+        "nearest": {"metric": "nearest", "promises": False},
+        "coordinated": {"metric": "coordinated"},
     }
     if part == "terrains":
         found["no-height"] = {"frontiers": FrontierConfig(gamma=None)}

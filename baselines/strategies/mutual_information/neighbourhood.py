@@ -16,7 +16,7 @@ from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.ending import gaussian_entropy_bits
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.validation import check, check_kind, check_not_negative, check_positive
-from entropy_explore_env.viewpoints.gradient_candidates import CANDIDATE, find_gradient_candidates
+from entropy_explore_env.viewpoints.gradient_candidates import gradient_candidates
 
 _LEAST_RADIUS_M = 0.5
 """Lower bound of the radius within which candidates lie, which is r̂ of the latest scan or the reach."""
@@ -76,7 +76,7 @@ class Neighbourhood:
         ]
         longest = longest_crossing(*grid.shape, math.inf, 1)
         self._crossing = Crossing(np.zeros(longest, np.int32), np.zeros(longest, np.int64))
-        self._marks, self._candidates = np.zeros(grid.voxels, np.uint8), np.zeros(0, CANDIDATE)
+        self._marks = np.zeros(grid.voxels, np.uint8)
         sigma = scenario.ending.sigma_end if config.known_sigma is None else config.known_sigma
         self._known_precision = float(sigma**-2)
         unknown_bits = gaussian_entropy_bits(scenario.sigma_prior) - gaussian_entropy_bits(sigma)
@@ -89,7 +89,8 @@ class Neighbourhood:
         position = grid.in_grid_units(view.pose)[:3]
         depth_m = max(view.depth_m, _LEAST_RADIUS_M)
         radius = min(depth_m, robot.reach_m, float(grid.size_m.sum())) / edge
-        candidates = self._near(view, position, radius)
+        layer = view.scenario.layer_of(robot)
+        candidates = gradient_candidates(view.precision, self._known_precision, position, radius, layer)
         if len(candidates) == 0:
             return None
         x, y, z = position.tolist()
@@ -115,19 +116,6 @@ class Neighbourhood:
             return None
         chosen = candidates[best]
         return np.array([*(origin + chosen["place"] * edge), chosen["yaw"], chosen["pitch"]])
-
-    def _near(self, view: RobotKnowledge, position: np.ndarray, radius: float) -> np.ndarray:
-        """Return the (K,) CANDIDATE within a radius that have a gradient."""
-        layer = view.scenario.layer_of(view.kind.robot)
-        across = [min(2 * math.floor(radius) + 3, size) for size in view.mean.shape]
-        most = across[0] * across[1] * (1 if layer is not None else across[2])
-        if len(self._candidates) < most:
-            self._candidates = np.zeros(most, CANDIDATE)
-        flat = -1 if layer is None else layer
-        count = find_gradient_candidates(
-            view.precision, self._known_precision, position, radius, flat, self._candidates
-        )
-        return self._candidates[:count]
 
     def _order(self, candidates: np.ndarray, radius: float) -> np.ndarray:
         """Return the (K,) candidates by the upper bound of their value, highest first; ties at random."""

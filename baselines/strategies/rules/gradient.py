@@ -9,12 +9,14 @@ of the way to l that lies in it.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from entropy_explore_env.planner.driver import Driver, Trail
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.viewpoints.gradient_candidates import steepest_viewpoint
+from entropy_explore_env.viewpoints.gradient_candidates import gradient_candidates
 
 
 class GradientStrategy(Driver):
@@ -49,13 +51,58 @@ class GradientStrategy(Driver):
         projected = view.planar if self._motion_plane is None else self._motion_plane
         position = grid.in_grid_units(view.pose)[:3]
         reach = min(robot.reach_m / grid.voxel_size_m, float(sum(grid.shape)))
-        viewpoint = view.pose.copy()
-        found = steepest_viewpoint(
-            view.mean, view.precision, position, view.pose[3], view.pose[4], reach, projected, viewpoint
-        )
-        if not found:
+        chosen = steepest(view.mean, view.precision, position, view.pose[3:], reach, projected)
+        if chosen is None:
             return None
-        viewpoint[:3] = np.asarray(grid.origin_m) + viewpoint[:3] * grid.voxel_size_m
+        place, gaze = chosen
+        viewpoint = np.array([*(np.asarray(grid.origin_m) + place * grid.voxel_size_m), *gaze])
         if view.planar:
             viewpoint[2], viewpoint[4] = view.pose[2], 0.0
         return viewpoint
+
+
+def steepest(
+    mean: np.ndarray,
+    precision: np.ndarray,
+    position: np.ndarray,
+    gaze: np.ndarray,
+    reach: float,
+    projected: bool,
+) -> tuple[np.ndarray, tuple[float, float]] | None:
+    """Return the place (3,) and the gaze (yaw, pitch) that the rule chooses; see the top of the file.
+
+    Of equal voxels the first in C order is taken; None = the gradient is zero everywhere.
+
+    Args:
+        mean: (X, Y, Z) float32, expected coverage.
+        precision: (X, Y, Z) float32, 1/σ².
+        position: (3,) of the robot, grid units.
+        gaze: (2,) yaw and pitch of the robot, which span its motion plane.
+        reach: In voxel edges, finite.
+        projected: Whether gradients and ways are projected on that plane.
+    """
+    candidates = gradient_candidates(precision, math.inf, position, reach, None)
+    places, slopes, steepness = candidates["place"], candidates["slope"], candidates["steepness"]
+    reachable = np.ones(len(places))
+    if projected:
+        slopes = _on_plane(slopes, *gaze)
+        steepness = np.sqrt((slopes**2).sum(axis=1))
+        way, length = places - position, candidates["distance"]
+        along = np.sqrt((_on_plane(way, *gaze) ** 2).sum(axis=1))
+        np.divide(along, length, out=reachable, where=length > 0.0)
+    uncovered = 1.0 - mean[tuple(places.astype(int).T)].astype(np.float64)
+    scores = reachable * steepness * uncovered
+    if scores.max(initial=0.0) <= 0.0:
+        return None
+    best = int(np.argmax(scores))
+    x, y, z = slopes[best].tolist()
+    yaw = math.atan2(y, x) if x != 0.0 or y != 0.0 else float(gaze[0])
+    return places[best], (yaw, -math.asin(min(max(z / float(steepness[best]), -1.0), 1.0)))
+
+
+def _on_plane(vectors: np.ndarray, yaw: float, pitch: float) -> np.ndarray:
+    """Return the projections (K, 3) on the plane of a gaze and its left (eq. 37)."""
+    ahead = np.array([math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), -math.sin(pitch)])
+    left = np.array([-math.sin(yaw), math.cos(yaw), 0.0])
+    along, across = ((vectors * axis).sum(axis=1, keepdims=True) for axis in (ahead, left))
+    return np.asarray(along * ahead + across * left)

@@ -108,7 +108,7 @@ class PerTimeVisibility(FrontierRule):
     def _allocated(self, scene: Scene, known: list[int], moving: list[int]) -> dict[int, Choice]:
         """Return what is allocated to the robot and to teammates that choose with it."""
         view, config = scene.view, self.config
-        allocator = Allocator(scene, config.metric)
+        allocator = Allocator(scene, config)
         if not config.promises:
             return allocator.allocate([], [])
         grid, stopped = self._scenario.grid, [mate for mate in known if mate not in moving]

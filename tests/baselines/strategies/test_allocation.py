@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from baselines.experiments.mission import scripted
-from baselines.strategies.metrics import ExplorationConfig, Nearest
+from baselines.strategies.metrics import ExplorationConfig
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA, FrontierConfig
 from entropy_explore_env.frontiers.knowledge import under_way
@@ -61,7 +61,7 @@ def test_robots_that_stop_at_the_same_time_share_the_frontiers():
     assert sent(corridor((3, 4))) == [2, 8]  # the second would be nearer to the first one's, too
     assert sent(corridor((4, 3))) == [8, 2]
     assert sent(corridor((3, 4)), promises=False) == [2, 2]
-    assert sent(corridor((3, 4)), metric=Nearest(), promises=False) == [2, 2]
+    assert sent(corridor((3, 4)), metric="nearest", promises=False) == [2, 2]
     assert sent(corridor((3, 4), heard=False)) == [2, 2]  # nothing was heard: each for itself
 
 

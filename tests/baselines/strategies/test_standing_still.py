@@ -14,7 +14,7 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import STRATEGIES, make_strategy
-from baselines.strategies.metrics import Coordinated, ExplorationConfig, Nearest
+from baselines.strategies.metrics import ExplorationConfig
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from baselines.suites.bundled_worlds import WORLDS
@@ -181,9 +181,9 @@ def test_robots_that_start_close_to_each_other_keep_moving(strategy, kind):
 @pytest.mark.parametrize(
     ("make", "seed"),
     [
-        (partial(PerTimeVisibility, ExplorationConfig(metric=Coordinated())), 7),
-        (partial(PerTimeVisibility, ExplorationConfig(metric=Nearest(), promises=False)), 9),
-        (partial(PerTimeVisibility, ExplorationConfig(metric=Nearest(), promises=False)), 13),
+        (partial(PerTimeVisibility, ExplorationConfig(metric="coordinated")), 7),
+        (partial(PerTimeVisibility, ExplorationConfig(metric="nearest", promises=False)), 9),
+        (partial(PerTimeVisibility, ExplorationConfig(metric="nearest", promises=False)), 13),
         (PerTimeVisibility, 8),
     ],
 )

@@ -10,7 +10,7 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.papers.sawhney.mission import explore_until_done
-from baselines.strategies.metrics import Coordinated, ExplorationConfig, Metric, Nearest
+from baselines.strategies.metrics import ExplorationConfig
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
@@ -27,8 +27,8 @@ from entropy_explore_env.settings.scenarios import BOX, find_scenario
 
 SETTINGS = {
     "per-time-visibility": ExplorationConfig(),
-    "the metric of Yamauchi": ExplorationConfig(metric=Nearest(), promises=False),
-    "the metric of Burgard": ExplorationConfig(metric=Coordinated()),
+    "the metric of Yamauchi": ExplorationConfig(metric="nearest", promises=False),
+    "the metric of Burgard": ExplorationConfig(metric="coordinated"),
 }
 PERFECT = {"burst": 10_000, "i_min_bits": 0.0}
 
@@ -122,10 +122,12 @@ def counting(count, counted):
     return noted
 
 
-@pytest.mark.parametrize("metric", [Metric(), Metric(0.5), Metric(bonus=0.5), Nearest(), Coordinated()])
+@pytest.mark.parametrize(
+    "metric", [{}, {"beta": 0.5}, {"bonus": 0.5}, {"metric": "nearest"}, {"metric": "coordinated"}]
+)
 @pytest.mark.parametrize("allocation", ["asynchronous", "synchronous"])
 def test_lazily_is_as_eagerly_in_plans(monkeypatch, metric, allocation):
-    settings = {"metric": metric, "allocation": allocation}
+    settings = {**metric, "allocation": allocation}
     lazy, done = check_lazily_is_as_eagerly(monkeypatch, small_plan(), 1, **settings)
     assert all(lazy.idle) and done[1][-1] > 0.99
 
@@ -135,7 +137,7 @@ def test_lazily_is_as_eagerly_in_plans(monkeypatch, metric, allocation):
     [
         {},
         {"frontiers": FrontierConfig(gamma=None)},
-        {"metric": Metric(60.0)},
+        {"beta": 60.0},
         {"frontiers": FrontierConfig(visibility="naive")},
         {"frontiers": FrontierConfig(unexplored_ground="level")},
     ],
@@ -251,15 +253,14 @@ def test_bodies_and_a_short_reach_explore_an_office():
 @pytest.mark.parametrize(
     ("kind", "settings", "field"),
     [
-        (Metric, {"beta": -1.0}, "Metric.beta"),
-        (Metric, {"bonus": -0.1}, "Metric.bonus"),
-        (Coordinated, {"beta": math.nan}, "Coordinated.beta"),
+        (ExplorationConfig, {"beta": -1.0}, "ExplorationConfig.beta"),
+        (ExplorationConfig, {"bonus": -0.1}, "ExplorationConfig.bonus"),
+        (ExplorationConfig, {"beta": math.nan}, "ExplorationConfig.beta"),
         (ExplorationConfig, {"allocation": "central"}, "ExplorationConfig.allocation"),
         (ExplorationConfig, {"once": 1}, "ExplorationConfig.once"),
         (ExplorationConfig, {"promises": 1}, "ExplorationConfig.promises"),
         (ExplorationConfig, {"metric": None}, "ExplorationConfig.metric"),
         (ExplorationConfig, {"metric": "V/t"}, "ExplorationConfig.metric"),
-        (ExplorationConfig, {"metric": Metric}, "ExplorationConfig.metric"),
         (PerTimeVisibility, {"config": "V/t"}, "config"),
         (FrontierConfig, {"spacing_m": 0.0}, "FrontierConfig.spacing_m"),
         (FrontierConfig, {"visibility": "all"}, "FrontierConfig.visibility"),
