@@ -1,13 +1,21 @@
-"""Which robot goes to which candidate: synchronous and asynchronous allocation (Sawhney 2009, sect. 3.2).
+"""Which robot goes to which candidate, and by which metric: settings and allocation of `per-time-visibility`.
 
-The pair of a robot and a candidate with the greatest value is allocated first. The points that are seen from
-there count as promised, and the next pair is chosen by what remains. Asynchronously only stopped robots take
-part, and the promises of robots under way hold until they have scanned; synchronously all robots wait for
-each other and take part together. Each robot allocates by its own belief and the messages that reached it
-(poses, announcements): it simulates the choices of the others, and makes its own. With perfect messages that
-is the paper's central procedure. Teammates of another kind are assumed to have the robot's own sensor and
-body. A robot counts as stopped if it was heard since it announced its latest viewpoint, that is, its scan
-arrived; or if nothing was heard of it for longer than any drive takes.
+    per-time       V/t, or V - βt; or (V + bonus)/t, a finishing rule of ours
+    nearest        the shortest path (Yamauchi 1998)
+    coordinated    1 - Σ P(d) - β·length, with P(d) = 1 - d/range within the range of a frontier that another
+                   robot goes to, and β = 0.01 (Burgard et al. 2005, eqs. 5-7, who find 0.01 … 50 alike)
+
+All else is as in per-time visibility: so they compare metrics, and are not the rules of those papers as their
+authors run them, which are `nearest-frontier` and `coordinated-frontier`.
+
+The pair of a robot and a candidate with the greatest value is allocated first (Sawhney 2009, sect. 3.2). The
+points that are seen from there count as promised, and the next pair is chosen by what remains. Asynchronously
+only stopped robots take part, and the promises of robots under way hold until they have scanned;
+synchronously all robots wait for each other and take part together. Each robot allocates by its own belief
+and the messages that reached it: it simulates the choices of the others, and makes its own. With perfect
+messages that is the paper's central procedure. Teammates of another kind are assumed to have the robot's own
+sensor and body. A robot counts as stopped if it was heard since it announced its latest viewpoint, that is,
+its scan arrived; or if nothing was heard of it for longer than any drive takes.
 """
 
 from __future__ import annotations
@@ -15,17 +23,77 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
-from baselines.strategies.metrics import ExplorationConfig
 from baselines.strategies.rules.coordinated_frontier import taken
+from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.frontiers.knowledge import centres_of, stays, under_way, voxel_of
 from entropy_explore_env.planner.scene import Scene
 from entropy_explore_env.planner.stops import apart_m
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.robots.motion import driving_time
 from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.validation import check, check_choice, check_kind, check_not_negative
+
+Metric = Literal["per-time", "nearest", "coordinated"]
+Allocation = Literal["asynchronous", "synchronous"]
+_COORDINATED_BETA = 0.01
+
+
+@dataclass(frozen=True)
+class ExplorationConfig:
+    """How robots choose frontiers.
+
+    Attributes:
+        metric: The values of candidates: see the top of the file.
+        beta: β of `per-time`; None = V/t.
+        bonus: Value of any frontier in addition to V of `per-time`, in V's units: slivers nearby are then
+            explored in passing instead of at the end. 0 = the paper's metric.
+        allocation: Whether robots choose when they stop, or all together.
+        promises: Whether points that teammates announced to see have less weight.
+        frontiers: Where candidates lie and what is seen from them.
+        once: Whether no finer σ counts as explored where no candidate is left: robots wait then.
+    """
+
+    metric: Metric = "per-time"
+    beta: float | None = None
+    bonus: float = 0.0
+    allocation: Allocation = "asynchronous"
+    promises: bool = True
+    frontiers: FrontierConfig = field(default_factory=FrontierConfig)
+    once: bool = False
+
+    def __post_init__(self) -> None:
+        """Check every field."""
+        check_choice(self, "metric")
+        if self.beta is not None:
+            check(self, "beta", "None, or a number ≥ 0", lambda v: 0.0 <= v < math.inf)
+        check_not_negative(self, "bonus")
+        check_choice(self, "allocation")
+        check_kind(self, "promises", bool)
+        check_kind(self, "frontiers", FrontierConfig)
+        check_kind(self, "once", bool)
+
+    def values(
+        self, seen: np.ndarray, seconds: np.ndarray, edges: np.ndarray, taken: np.ndarray
+    ) -> np.ndarray:
+        """Return the values (K,) of candidates: never greater for less V, or for a longer path.
+
+        Args:
+            seen: (K,) V·(height factor) in points' size.
+            seconds: (K,) of the drives, and of the scans at their stops.
+            edges: (K,) lengths of the paths in voxel edges.
+            taken: (K,) Σ P(d) ≥ 0.
+        """
+        if self.metric == "nearest":
+            return -edges
+        if self.metric == "coordinated":
+            return 1.0 - taken - _COORDINATED_BETA * edges
+        worth = seen + self.bonus
+        return worth / seconds if self.beta is None else worth - self.beta * seconds
+
 
 _driving_times = np.vectorize(driving_time, otypes=[float])
 _DELAY = 1.5

@@ -1,9 +1,10 @@
-"""Cells in blocks: where mapped space ends (Yamauchi 1998), and one frontier candidate for each block.
+"""What is known of each cell of one robot's map, and its blocks: where mapped space ends, one candidate each.
 
-A cell is a voxel, or a column of ground. The edge consists of mapped free cells next to unexplored ones; at a
-finer level also of mapped cells that are unexplored themselves. A candidate is a cell that has room and whose
-footprint meets the edge; the one nearest to the middle of its block represents the block. Cells are known by
-number, C order; lengths are in cells. `blocks` is always a Blocks.
+A cell is a voxel, or a column of ground. A voxel is explored once its σ has fallen to a stated level. The
+edge (Yamauchi 1998) consists of mapped free cells next to unexplored ones; at a finer level also of mapped
+cells that are unexplored themselves. A candidate is a cell that has room and whose footprint meets the edge;
+the one nearest to the middle of its block represents the block. Cells are known by number, C order; lengths
+are in cells. `blocks` is always a Blocks.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
@@ -36,6 +38,80 @@ _ALL_FLAGS = 31
 NONE = -1
 """In place of the number of a cell or voxel: there is none."""
 _NO_COSTS = np.zeros(0)
+_TOGETHER = 128
+"""Voxels that are compared together, without branches, before single ones are."""
+
+
+class VoxelStates(NamedTuple):
+    """States of V voxels."""
+
+    state: np.ndarray
+    """(V,) uint8: UNEXPLORED, UNMAPPED, COVERED."""
+    changed: np.ndarray
+    """(V,) int32, the voxels that changed in the latest update come first."""
+    opened: np.ndarray
+    """(V + X·Y,) int32, the first `opened_count` are voxels past which more may be visible than before."""
+    opened_count: np.ndarray
+    """(1,) int64; set to 0 by the reader."""
+    size: tuple[int, int, int]
+
+
+def new_states(shape: tuple[int, int, int]) -> VoxelStates:
+    """Return the states of (X, Y, Z) voxels of which nothing is explored."""
+    voxels = math.prod(shape)
+    return VoxelStates(
+        state=np.full(voxels, UNEXPLORED | UNMAPPED, np.uint8),
+        changed=np.zeros(voxels, np.int32),
+        opened=np.zeros(voxels + shape[0] * shape[1], np.int32),
+        opened_count=np.zeros(1, np.int64),
+        size=(int(shape[0]), int(shape[1]), int(shape[2])),
+    )
+
+
+@inlined_kernel
+def _state_of(mean, precision, levels):
+    """Return the state of a voxel without branches: for many voxels at once."""
+    unexplored, unmapped = np.uint8(precision < levels[0]), np.uint8(precision < levels[1])
+    covered = np.uint8(mean > np.float32(STOP_AT_COVERED)) & ~unmapped
+    return np.uint8(unexplored * UNEXPLORED | unmapped * UNMAPPED | covered * COVERED)
+
+
+@inlined_kernel
+def note_opened(states, voxel):
+    """Note that more may be visible past a voxel than before."""
+    states.opened[states.opened_count[0]] = voxel
+    states.opened_count[0] += 1
+
+
+@lean_kernel
+def update_states(states, mean, precision, levels):
+    """Bring the states up to date with a belief.
+
+    Args:
+        states: Of the robot.
+        mean: (V,) float32.
+        precision: (V,) float32 1/σ² > 0.
+        levels: (explored, mapped): precisions from which on a voxel is explored, and mapped.
+
+    Returns:
+        How many voxels are in another state than at the latest update.
+    """
+    state, count = states.state, 0
+    for first in range(0, len(state), _TOGETHER):
+        last, different = min(first + _TOGETHER, len(state)), np.uint8(0)
+        for voxel in range(first, last):
+            different |= state[voxel] ^ _state_of(mean[voxel], precision[voxel], levels)
+        if different == 0:
+            continue
+        for voxel in range(first, last):
+            before, now = state[voxel], _state_of(mean[voxel], precision[voxel], levels)
+            if now != before:
+                state[voxel] = now
+                states.changed[count] = voxel
+                count += 1
+                if before & COVERED > now & COVERED or before & UNEXPLORED < now & UNEXPLORED:
+                    note_opened(states, voxel)
+    return count
 
 
 class Blocks(NamedTuple):

@@ -32,8 +32,8 @@ from entropy_explore_env.frontiers.blocks import (
     mark_edges,
     set_flag,
     shares_face,
+    update_states,
 )
-from entropy_explore_env.frontiers.voxel_states import update_states
 
 _KNOWN_FREE = 1
 """States above this are unmapped or covered."""

@@ -15,9 +15,9 @@ from entropy_explore_env.frontiers.blocks import (
     UNEXPLORED,
     UNMAPPED,
     new_blocks,
+    new_states,
 )
 from entropy_explore_env.frontiers.voxel_map import body_footprint, update_voxels
-from entropy_explore_env.frontiers.voxel_states import new_states
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 

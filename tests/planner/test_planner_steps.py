@@ -10,11 +10,11 @@ import pytest
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import belief_costs
 from entropy_explore_env.belief.visibility import CONE
-from entropy_explore_env.planner.choice import choose
 from entropy_explore_env.planner.far import first_stop, propose_far
 from entropy_explore_env.planner.memory import trust_and_clearance, worth_bits
 from entropy_explore_env.planner.model import Situation, new_proposers
 from entropy_explore_env.planner.nearby import propose_nearby, start_paths
+from entropy_explore_env.planner.propose import choose
 from entropy_explore_env.planner.recipe import ALL_AROUND, NARROW_PLANNED, NARROW_STRAIGHT
 from entropy_explore_env.planner.records import EXPERIENCE, KNOWLEDGE, MATE, Kind
 from entropy_explore_env.planner.states import PlannerState

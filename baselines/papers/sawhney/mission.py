@@ -17,7 +17,7 @@ import numpy as np
 
 from baselines.experiments.rows import Record
 from baselines.papers.sawhney.terrain_model import CEILING_M, model_file
-from baselines.strategies.metrics import ExplorationConfig
+from baselines.strategies.allocation import ExplorationConfig
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures

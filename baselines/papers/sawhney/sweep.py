@@ -13,7 +13,7 @@ from typing import Any
 from baselines.experiments.experiment import Amount
 from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.papers.sawhney.mission import Run
-from baselines.strategies.metrics import ExplorationConfig
+from baselines.strategies.allocation import ExplorationConfig
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario

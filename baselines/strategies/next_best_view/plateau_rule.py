@@ -15,7 +15,7 @@ from typing import cast
 import numpy as np
 
 from baselines.strategies.next_best_view.ground_map import EdgeForm, GroundMap
-from baselines.strategies.next_best_view.pose_samples import path_points, reachable_voxels, yaws_around
+from baselines.strategies.next_best_view.poses import path_points, reachable_voxels, yaws_around
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.knowledge import voxel_of

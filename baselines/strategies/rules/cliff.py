@@ -20,7 +20,7 @@ import numpy as np
 from baselines.strategies.next_best_view.elevation_view import fill_new_information
 from baselines.strategies.next_best_view.ground_map import EdgeForm, GroundMap, camera_of
 from baselines.strategies.next_best_view.plateau_rule import STEEP_RAD, PlateauRule
-from baselines.strategies.next_best_view.pose_samples import drawn_poses, pose_distance, poses_in
+from baselines.strategies.next_best_view.poses import drawn_poses, pose_distance, poses_in
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 

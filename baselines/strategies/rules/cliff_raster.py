@@ -14,7 +14,7 @@ import numpy as np
 
 from baselines.strategies.next_best_view.ground_map import GroundMap
 from baselines.strategies.next_best_view.plateau_rule import PlateauRule
-from baselines.strategies.next_best_view.pose_samples import poses_in
+from baselines.strategies.next_best_view.poses import poses_in
 from baselines.strategies.rules.raster import RasterScan
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.robots.knowledge import RobotKnowledge

@@ -15,8 +15,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from baselines.strategies.next_best_view.drawn_poses import DrawnPoses
 from baselines.strategies.next_best_view.expected_view import OccupancyMap
+from baselines.strategies.next_best_view.poses import DrawnPoses
 from entropy_explore_env.planner.scene import Scene
 
 

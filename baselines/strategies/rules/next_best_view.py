@@ -22,14 +22,13 @@ from typing import Literal
 
 import numpy as np
 
-from baselines.strategies.next_best_view.drawn_poses import DrawnPoses
 from baselines.strategies.next_best_view.expected_view import (
     UNCERTAINTY,
     OccupancyMap,
     new_information,
     voxels_in_view,
 )
-from baselines.strategies.next_best_view.pose_samples import localization_error, pose_distance
+from baselines.strategies.next_best_view.poses import DrawnPoses, localization_error, pose_distance
 from entropy_explore_env.frontiers.knowledge import voxel_of
 from entropy_explore_env.planner.scene import Scene
 from entropy_explore_env.settings.validation import check_choice, check_count, check_kind, check_within

@@ -25,8 +25,7 @@ from typing import cast
 
 import numpy as np
 
-from baselines.strategies.allocation import Allocator, Choice, Round, bodies_touch
-from baselines.strategies.metrics import ExplorationConfig
+from baselines.strategies.allocation import Allocator, Choice, ExplorationConfig, Round, bodies_touch
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA

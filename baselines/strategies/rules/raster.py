@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from baselines.strategies.next_best_view.pose_samples import reachable_voxels, yaws_around
+from baselines.strategies.next_best_view.poses import reachable_voxels, yaws_around
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import FrontierRule

@@ -20,8 +20,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from baselines.strategies.voronoi.controls import nearest_uncertain, projected_centroid
-from baselines.strategies.voronoi.territory import Territory
+from baselines.strategies.territory import Territory, nearest_uncertain, projected_centroid
 from entropy_explore_env.belief.paths.geodesic_cells import UNREACHED
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.knowledge import voxel_of

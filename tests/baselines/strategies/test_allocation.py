@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from baselines.experiments.mission import scripted
-from baselines.strategies.metrics import ExplorationConfig
+from baselines.strategies.allocation import ExplorationConfig
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA, FrontierConfig
 from entropy_explore_env.frontiers.knowledge import under_way

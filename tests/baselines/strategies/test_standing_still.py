@@ -14,7 +14,7 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import STRATEGIES, make_strategy
-from baselines.strategies.metrics import ExplorationConfig
+from baselines.strategies.allocation import ExplorationConfig
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from baselines.suites.bundled_worlds import WORLDS

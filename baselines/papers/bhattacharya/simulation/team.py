@@ -20,7 +20,7 @@ from baselines.papers.bhattacharya.simulation.covering import (
     coverage_functional,
     step_is_free,
 )
-from baselines.strategies.voronoi.controls import nearest_uncertain, projected_centroid
+from baselines.strategies.territory import nearest_uncertain, projected_centroid
 from entropy_explore_env.belief.paths.geodesic_cells import (
     UNREACHED,
     extract_path,

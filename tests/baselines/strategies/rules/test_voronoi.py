@@ -12,7 +12,7 @@ from scipy import stats
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
 from baselines.strategies.rules.voronoi import VoronoiCoverage
-from baselines.strategies.voronoi.territory import deviation_entropy, filtered, inflate_obstacles
+from baselines.strategies.territory import deviation_entropy, filtered, inflate_obstacles
 from entropy_explore_env.belief.entropy import LN2, fill_occupancy_entropy
 from entropy_explore_env.belief.paths.lattice import new_lattice
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv

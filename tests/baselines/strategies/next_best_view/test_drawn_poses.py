@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from baselines.strategies.next_best_view.pose_samples import drawn_poses, pose_distance, yaws_around
+from baselines.strategies.next_best_view.poses import drawn_poses, pose_distance, yaws_around
 
 
 def test_yaws_show_all_around_and_poses_lie_where_they_are_drawn():

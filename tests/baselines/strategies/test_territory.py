@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.strategies.voronoi.controls import nearest_uncertain, projected_centroid
+from baselines.strategies.territory import nearest_uncertain, projected_centroid
 from entropy_explore_env.belief.paths.geodesic_cells import UNREACHED, new_tessellation, tessellate
 from tests.belief.paths.test_geodesic_cells import drawn_rates
 from tests.reference.scenes import SHAPES, drawn, seeds

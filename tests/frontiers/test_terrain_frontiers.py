@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from entropy_explore_env.frontiers.blocks import NONE, mark_around, replace_unreached
-from entropy_explore_env.frontiers.terrain_map import (
+from entropy_explore_env.frontiers.terrain_frontiers import (
     fill_column_costs,
     new_terrain_map,
     take_column,

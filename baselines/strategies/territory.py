@@ -1,7 +1,8 @@
 """One robot's belief as the Voronoi rules see it: how uncertain voxels are, what paths cost, who owns what.
 
-Arrays have the shape of the grid; voxels are numbered in C order. Entropies are in nats: that of occupancy
-(Bhattacharya 2010, belief/entropy.py), or one by standard deviation, ours.
+Arrays have the shape of the grid; voxels are numbered in C order, and a cell is the (N,) int64 numbers of its
+voxels, ascending. Entropies are in nats: that of occupancy (Bhattacharya, Michael & Kumar 2010,
+belief/entropy.py), or one by standard deviation, ours. Density φ is (X, Y, Z) float32 > 0, without a unit.
 """
 
 from __future__ import annotations
@@ -12,7 +13,12 @@ import numpy as np
 from scipy import ndimage
 
 from entropy_explore_env.belief.entropy import LN2, fill_occupancy_entropy
-from entropy_explore_env.belief.paths.geodesic_cells import extract_path, new_tessellation, tessellate
+from entropy_explore_env.belief.paths.geodesic_cells import (
+    UNREACHED,
+    extract_path,
+    new_tessellation,
+    tessellate,
+)
 from entropy_explore_env.belief.paths.lattice import Lattice
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.frontiers.knowledge import belief_of, centres_of, teammates_that_share, voxel_of
@@ -27,6 +33,30 @@ from entropy_explore_env.viewpoints.evaluation import (
     sees_all_around,
 )
 from entropy_explore_env.viewpoints.expected_scan import expected_bits
+
+
+def projected_centroid(cell: np.ndarray, density: np.ndarray, threshold: float) -> int:
+    """Return the voxel of a cell that is nearest to its centroid (eqs. 6-8); UNREACHED in an empty cell.
+
+    C = Σ q φ(q) / Σ φ(q)   over the cell;   the target is the q nearest to C, of those with φ(q) ≥ τ if
+    there are any, else of all voxels of the cell.
+    """
+    if len(cell) == 0:
+        return UNREACHED
+    weights = density.reshape(-1)[cell].astype(np.float64)
+    places = np.stack(np.unravel_index(cell, density.shape), axis=-1)
+    sums = (weights[:, None] * np.column_stack([np.ones(len(cell)), places])).sum(axis=0)
+    uncertain = weights >= threshold
+    if uncertain.any():
+        cell, places = cell[uncertain], places[uncertain]
+    return int(cell[int(np.argmin(((places - sums[1:] / sums[0]) ** 2).sum(axis=1)))])
+
+
+def nearest_uncertain(cell: np.ndarray, costs: np.ndarray, density: np.ndarray, threshold: float) -> int:
+    """Return the voxel of a cell with φ ≥ τ that costs least to reach; UNREACHED if no φ is ≥ τ."""
+    among = cell[density.reshape(-1)[cell] >= threshold]
+    return int(among[int(np.argmin(costs.reshape(-1)[among]))]) if len(among) else UNREACHED
+
 
 _GAZES = 16
 _PITCHES = (-0.6, 0.0, 0.6)

@@ -1,1 +1,0 @@
-"""What the rules of Bhattacharya, Michael and Kumar need: cells, controls, uncertainty."""
