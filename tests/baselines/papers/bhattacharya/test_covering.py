@@ -16,7 +16,7 @@ from entropy_explore_env.belief.paths.geodesic_cells import (
     extract_path,
     new_tessellation,
 )
-from tests.baselines.strategies.voronoi.test_controls import scene
+from tests.baselines.strategies.test_territory import scene
 from tests.reference.scenes import SHAPES, drawn, seeds
 
 
