@@ -11,11 +11,6 @@ from hypothesis import strategies as st
 from scipy.ndimage import distance_transform_cdt
 
 from entropy_explore_env.belief.elevation import (
-    _new_board,
-    _relax,
-    _set_out,
-    _share_out,
-    _take_in,
     completed,
     elevation_map,
 )
@@ -112,21 +107,6 @@ def test_a_wide_gap_is_bridged_in_a_straight_line():
     np.testing.assert_allclose(completed(heights, known), np.repeat(expected[:, None], 3, 1), atol=2e-4)
 
 
-def test_a_relaxation_ends_after_its_sweeps_or_at_its_tolerance():
-    for sweeps, tolerance, expected in (
-        (1, 0.0, [2.0, 3.5]),
-        (2, 0.0, [2.25, 3.625]),
-        (9, 9.0, [2.0, 3.5]),
-    ):
-        heights, fixed = np.array([[1.0], [0.0], [3.0], [5.0]]), np.array([[True], [False], [False], [True]])
-        board, before = _new_board(4, 1), _new_board(4, 1)
-        assert _set_out(board, heights, fixed, np.empty((4, 1), np.int32)) == 1
-        _share_out(board, fixed, 1.0)
-        _relax(board, before, 1.0, sweeps, tolerance, np.zeros(4, np.int64))
-        _take_in(board, heights)
-        assert heights[:, 0].tolist() == [1.0, *expected, 5.0]
-
-
 def test_nothing_known_is_level_and_all_known_stays():
     assert (completed(np.full((3, 4), np.nan), np.zeros((3, 4), bool)) == 0.0).all()
     heights = np.arange(12.0).reshape(3, 4)
@@ -177,7 +157,7 @@ def chessboard(heights, fixed, tolerance):
 def test_sweeps_that_go_over_the_rows_together_are_those_done_one_after_the_other(shape):
     """Bit for bit, whatever the number of sweeps that it takes."""
     rng, counts = np.random.default_rng(shape[0]), set()
-    for tolerance in (0.3, 1e-2, 1e-4):
+    for tolerance in (0.3, 1e-2, 1e-4, 1e-300):  # the last uses its sweeps up
         for share in (0.03, 0.4, 1.0):
             heights, fixed = rng.random(shape), rng.random(shape) < share
             fixed.flat[rng.integers(fixed.size)] = True

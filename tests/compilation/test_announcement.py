@@ -58,10 +58,3 @@ def test_workers_are_silent(caplog, monkeypatch):
     compile_two()
     announcement.end_of_step()
     assert not caplog.records
-
-
-def test_why_nothing_is_kept_is_said_once(caplog):
-    announcement.explain_not_kept(Path("/read/only"), PermissionError(13, "Permission denied"))
-    announcement.explain_not_kept(None, None)
-    (record,) = caplog.records
-    assert "/read/only: Permission denied" in record.getMessage() and "NUMBA_CACHE_DIR" in record.getMessage()

@@ -72,11 +72,13 @@ def test_a_reset_mask_takes_seeds_for_its_missions_alone() -> None:
     assert env.missions.seeds == [7, 6, 7] and env.missions.episodes == [0, 0, 0]
 
 
-@pytest.mark.parametrize("starts", AutoresetMode)
+@pytest.mark.parametrize("starts", [*AutoresetMode, None])
 def test_where_missions_start_anew_all_do_or_none(
-    starts: AutoresetMode, monkeypatch: pytest.MonkeyPatch
+    starts: AutoresetMode | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    env = EntropyExploreVectorEnv("box-7x11x5", 3, autoreset_mode=starts, max_cycles=2)
+    """By themselves in a mode, or with None by a reset."""
+    mode = starts or AutoresetMode.NEXT_STEP
+    env = EntropyExploreVectorEnv("box-7x11x5", 3, autoreset_mode=mode, max_cycles=2)
     env.reset(seed=0)
     actions = some_actions(env, 3)
     env.step(actions[0])
@@ -96,7 +98,7 @@ def test_where_missions_start_anew_all_do_or_none(
         assert not drawn
         return
     with pytest.raises(WorldError):
-        env.step(actions[2])
+        env.step(actions[2]) if starts else env.reset(seed=5)
     assert env.missions.episodes == [0, 0, 0]
-    if starts is AutoresetMode.NEXT_STEP:
+    if starts is not AutoresetMode.SAME_STEP:
         require_same("refused", before, snapshot(env))

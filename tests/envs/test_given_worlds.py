@@ -64,13 +64,6 @@ def test_worlds_are_dealt_to_missions_and_to_episodes():
     assert team.missions.worlds[0] is OTHER
 
 
-@pytest.mark.parametrize("scenario", ["room", "office", "terrain"])
-def test_a_team_that_finds_no_room_is_refused_as_in_any_world(scenario):
-    env = eee.parallel_env(scenario, world=HUT, robot={"body_radius_m": 2.3})
-    with pytest.raises(eee.WorldError, match="hut 4"):
-        env.reset(seed=0)
-
-
 def test_the_scenario_of_a_given_world_makes_no_other_by_itself():
     env = eee.parallel_env("room", world=HUT)
     with pytest.raises(eee.SettingError, match="'given'"):

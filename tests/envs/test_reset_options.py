@@ -102,13 +102,6 @@ def test_a_world_number_is_the_world_that_the_recipe_makes_of_it() -> None:
     assert (poses(worlds[0].missions) != poses(worlds[1].missions)).any()
 
 
-def test_a_world_object_is_the_truth() -> None:
-    team, there = parallel_env(**BOX), hut()
-    team.reset(seed=0, options={"world": there})
-    assert team.missions.worlds[0] is there
-    np.testing.assert_array_equal(team.missions.state.truth[0], there.occupied.ravel())
-
-
 def test_the_other_adapters_take_them_too() -> None:
     turns = env(**BOX)
     turns.reset(seed=0, options={"starts": STARTS, "world": hut()})

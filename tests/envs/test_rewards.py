@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from entropy_explore_env import SettingError, SingleRobotEnv, StepFigures, env, parallel_env
+from entropy_explore_env import SettingError, SingleRobotEnv, StepFigures, parallel_env
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.reports.mission_record import CommandRecorder
@@ -123,15 +123,6 @@ def rewards_of_team(seed: int, steps: int, **settings: Any) -> list[list[float]]
         actions = actions_of(step, (8, 2, 5))[seed]
         rewards.append(list(team.step(dict(zip(team.agents, actions, strict=True)))[1].values()))
     return rewards
-
-
-def test_the_turn_taking_form_gives_the_same_rewards() -> None:
-    turns, expected = env(**BOX, reward_function=weighed), rewards_of_team(1, 4)
-    turns.reset(seed=1)
-    for step, earned in enumerate(expected):
-        for action in actions_of(step, (8, 2, 5))[1]:
-            turns.step(action)
-        assert list(turns.rewards.values()) == earned
 
 
 @pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])

@@ -8,7 +8,6 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-import pygame
 import pytest
 
 from entropy_explore_env import (
@@ -97,35 +96,6 @@ def test_copies_in_mid_episode_go_on_alike(kind: str) -> None:
     for copied in copies:
         require_same("copy", rest, leaves([copied.step(action) for action in actions[12:]]))
         require_same("next episode", leaves(copy.deepcopy(env).reset()), leaves(copied.reset()))
-
-
-def test_pictures_and_windows() -> None:
-    env = gymnasium.make(environment_id(BOX), render_mode="rgb_array")
-    env.reset(seed=0)
-    picture = env.render()
-    assert isinstance(picture, np.ndarray) and picture.shape == (480, 640, 3) and picture.dtype == np.uint8
-    env.close()
-    window = gymnasium.make(environment_id(BOX), render_mode="human")
-    window.reset(seed=0)
-    window.step(window.action_space.sample())
-    assert window.render() is None
-    assert pygame.display.get_surface() is not None
-    window.close()
-    assert pygame.display.get_surface() is None
-
-
-def test_gymnasium_s_wrappers_find_what_they_need() -> None:
-    env = gymnasium.wrappers.RecordEpisodeStatistics(
-        gymnasium.wrappers.FlattenObservation(gymnasium.make(environment_id(BOX), max_cycles=10))
-    )
-    env.reset(seed=0)
-    rewards = []
-    for action in random_actions(env, 10):
-        observation, reward, _, truncated, info = env.step(action)
-        assert env.observation_space.contains(observation)
-        rewards.append(float(reward))
-    assert truncated and info["episode"]["l"] == 10
-    assert info["episode"]["r"] == pytest.approx(sum(rewards))
 
 
 @pytest.mark.parametrize("kind", ["discrete", "candidates"])

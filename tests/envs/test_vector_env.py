@@ -16,13 +16,11 @@ from entropy_explore_env import (
     EntropyExploreVectorEnv,
     SettingError,
     SingleRobotEnv,
-    WorldError,
     environment_id,
     find_scenario,
     parallel_env,
 )
 from entropy_explore_env.envs.conformance import leaves, require_same, snapshot
-from entropy_explore_env.missions import episode as missions
 from tests.reference.scenes import SMALL
 
 BOX = "box-7x11x5"
@@ -170,17 +168,6 @@ def test_bad_reset_masks_are_refused_and_change_nothing(mask: Any) -> None:
     require_same("bad mask", before, snapshot(env))
 
 
-@pytest.mark.parametrize(
-    "settings", [{"num_envs": 0}, {"num_envs": 2.0}, {"threads": 0}, {"autoreset_mode": "never"}]
-)
-def test_bad_settings_are_named(settings: dict[str, Any]) -> None:
-    with pytest.raises(SettingError) as caught:
-        EntropyExploreVectorEnv(BOX, **settings)
-    assert next(iter(settings)) in str(caught.value)
-    with pytest.raises(SettingError, match=r"Scenario\.speed"):
-        gymnasium.make_vec(environment_id(BOX), num_envs=2, speed=3)
-
-
 def test_calls_before_reset_are_refused() -> None:
     env = EntropyExploreVectorEnv(BOX, 2, render_mode="rgb_array")
     actions = some_actions(env, 1)[0]
@@ -193,30 +180,6 @@ def test_calls_before_reset_are_refused() -> None:
     env.step(actions)
 
 
-def test_a_world_without_room_leaves_the_other_missions_as_they_were(monkeypatch: pytest.MonkeyPatch) -> None:
-    env = EntropyExploreVectorEnv("box-7x11x5", 3, robots=2)
-    env.reset(seed=0)
-    env.step(some_actions(env, 1)[0])
-    before, drawn = snapshot(env), []
-
-    def full_at_last(*given: Any) -> np.ndarray:
-        drawn.append(given)
-        if len(drawn) == 3:
-            raise WorldError("Scenario.robots", 2, "fewer")
-        return real(*given)
-
-    real = missions.start_poses
-    monkeypatch.setattr(missions, "start_poses", full_at_last)
-    with pytest.raises(WorldError):
-        env.reset(seed=5)
-    require_same("refused", before, snapshot(env))
-
-
-def test_options_that_are_no_dict_are_refused() -> None:
-    with pytest.raises(SettingError, match="options"):
-        EntropyExploreVectorEnv(BOX, 2).reset(options=3)  # type: ignore[arg-type]
-
-
 def test_a_reset_of_other_missions_leaves_the_picture_of_the_first() -> None:
     env = EntropyExploreVectorEnv(BOX, 2, render_mode="rgb_array")
     env.reset(seed=0)
@@ -227,22 +190,6 @@ def test_a_reset_of_other_missions_leaves_the_picture_of_the_first() -> None:
     after: Any = env.render()
     np.testing.assert_array_equal(after[0], before[0])
     assert (after[1] != before[1]).any()
-
-
-@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
-def test_gymnasium_s_vector_wrappers_count_episodes(mode: AutoresetMode) -> None:
-    env = gymnasium.make_vec(environment_id(BOX), num_envs=3, autoreset_mode=mode, max_cycles=5)
-    counted = gymnasium.wrappers.vector.RecordEpisodeStatistics(env)
-    counted.reset(seed=0)
-    total, lengths = np.zeros(3), []
-    for actions in some_actions(env, 17):  # type: ignore[arg-type]
-        _, rewards, terminations, truncations, infos = counted.step(actions)
-        total += rewards
-        if (terminations | truncations).any():
-            np.testing.assert_allclose(infos["episode"]["r"], total)
-            lengths.append(infos["episode"]["l"].tolist())
-            total[:] = 0.0
-    assert lengths == [[5, 5, 5]] * 3
 
 
 def test_each_mission_has_a_picture_and_the_window_shows_the_first() -> None:

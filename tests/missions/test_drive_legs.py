@@ -20,37 +20,38 @@ ENDLESS = {"sigma_end": 1e-4}
 NO_PARTS = {"panorama": False, "self_state": False, "team": False}
 
 
-def crowded(**changes):
-    """Five robots that wander in each other's way for ever."""
-    made = free_box(robots=5, world="furnished", observation=NO_PARTS)
-    return with_settings(made, {"ending": ENDLESS, **changes})
-
-
-def in_a_room(navigator, reach_m, period_s, scan_every_m):
-    """Large bodies in the furnished room."""
-    robot = {"body_radius_m": 0.4, "reach_m": reach_m, "max_speed_m_s": 1.0, "navigator": navigator}
-    settings = {"robots": 5, "robot": robot, "decision_period_s": period_s, "observation": NO_PARTS}
-    sensor = {"angular_step_rad": math.pi / 12, "scan_every_m": scan_every_m}
-    return with_settings(ROOM_FURNISHED, {**settings, "sensor": sensor, "ending": ENDLESS})
-
-
-def of_three_sizes(navigator):
-    """Bodies of 0.1, 0.24 and 0.45 m, of which the second drives straight."""
-    first, *others = (
-        RobotKind(
-            Robot(reach_m=3.0, body_radius_m=radius_m, navigator=navigates, max_speed_m_s=speed_m_s),
-            RangeSensor((0.0, 0.0), 0.1),
-        )
-        for radius_m, navigates, speed_m_s in (
-            (0.1, navigator, 0.3),
-            (0.24, "straight", 0.9),
-            (0.45, navigator, 0.5),
-        )
+SCANNING = with_settings(
+    ROOM_FURNISHED,
+    {
+        "robots": 5,
+        "robot": {"body_radius_m": 0.4, "reach_m": 9.0, "max_speed_m_s": 1.0, "navigator": "planned"},
+        "sensor": {"angular_step_rad": math.pi / 12, "scan_every_m": 0.5},
+        "decision_period_s": 0.1,
+        "observation": NO_PARTS,
+        "ending": ENDLESS,
+    },
+)
+BODIES = [
+    RobotKind(
+        Robot(reach_m=3.0, body_radius_m=radius_m, navigator=navigates, max_speed_m_s=speed_m_s),
+        RangeSensor((0.0, 0.0), 0.1),
     )
-    team = {"robots": 6, "robot": first.robot, "sensor": first.sensor, "extra_kinds": tuple(others)}
-    return crowded(**team, decision_period_s=0.6)
-
-
+    for radius_m, navigates, speed_m_s in (
+        (0.1, "planned", 0.3),
+        (0.24, "straight", 0.9),
+        (0.45, "planned", 0.5),
+    )
+]
+THREE_SIZES = free_box(
+    robots=6,
+    world="furnished",
+    robot=BODIES[0].robot,
+    sensor=BODIES[0].sensor,
+    extra_kinds=tuple(BODIES[1:]),
+    decision_period_s=0.6,
+    observation=NO_PARTS,
+    ending=ENDLESS,
+)
 OFFICE_CROWD = {
     "robots": 5,
     "robot": {"reach_m": 6.0, "body_radius_m": 0.25},
@@ -61,16 +62,9 @@ OFFICE_CROWD = {
 }
 CROWDS = {
     "big bodies in the tiny box": (with_settings(TIGHT, {"ending": ENDLESS}), 100),
-    "small bodies": (crowded(robot={"body_radius_m": 0.24, "reach_m": 3.0}), 100),
-    "small bodies that plan": (
-        crowded(robot={"body_radius_m": 0.24, "reach_m": 3.0, "navigator": "planned"}),
-        150,
-    ),
     "a plan": (with_settings(OFFICE, OFFICE_CROWD), 150),
-    "a room": (in_a_room("straight", 6.0, 1.1, math.inf), 100),
-    "scans that end planned drives": (in_a_room("planned", 9.0, 0.1, 0.5), 900),
-    "three sizes": (of_three_sizes("straight"), 120),
-    "three sizes that plan": (of_three_sizes("planned"), 120),
+    "scans that end planned drives": (SCANNING, 900),
+    "three sizes that plan": (THREE_SIZES, 120),
 }
 
 

@@ -47,20 +47,6 @@ def play(scenario, seed=0, steps=4000):
     return missions, before
 
 
-@pytest.mark.parametrize("channel", [SHARES, {"burst": 0}])
-def test_without_faults_all_maps_have_to_be_complete(channel):
-    ends = {}
-    for termination in ("any", "all", "shared"):
-        scenario = free_box(robots=3, channel=channel, ending={"termination": termination, "sigma_end": 0.2})
-        missions, before = play(scenario)
-        assert missions.over(0) is MissionEnd.MAPPED
-        passed = maps_passed(missions)
-        assert passed.any() if termination == "any" else passed.all()
-        assert not before.all() and (termination != "any" or not before.any())
-        ends[termination] = float(missions.state.missions["time_s"][0])
-    assert ends["any"] <= ends["all"] == ends["shared"]
-
-
 def test_robots_that_have_stopped_for_good_do_not_count():
     faults = {"stop": {"at_s": 3.0, "robots": (1,)}}
     ending = {"sigma_end": 0.2, "time_limit_s": 2000.0}

@@ -116,10 +116,3 @@ def test_a_landmark_is_found_in_a_hall_that_is_higher_than_it_is_long_and_wide()
     toward(missions, here)
     (kept,) = missions.state.landmarks[0, 0]
     assert kept["used"] and kept["place"][1] == pytest.approx(2.5, abs=0.02)  # the face of the post
-
-
-def test_where_none_are_asked_for_there_are_none():
-    exact = started(free_box(robots=2, fiducials={"own_number": 5}))
-    assert exact.state.landmarks.shape[1] == 0
-    drifting = started(free_box(robots=2, robot={"localization": SOME}))
-    assert drifting.state.landmarks.shape == (1, 2, 0)

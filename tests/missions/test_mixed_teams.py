@@ -178,31 +178,6 @@ def test_the_mask_and_the_actions_of_each_kind():
                 assert view.action_for(tried.state.robots[0, robot]["target"]) == number
 
 
-def test_continuous_actions_take_each_kind_where_it_wants():
-    missions = started(with_settings(MIXED, {"robots": 2}), seed=2)
-    rng = np.random.default_rng(0)
-    for _ in range(30):
-        boxes = np.zeros((1, 2, 5))
-        wanted = np.zeros((2, 5))
-        for robot in range(2):
-            view = view_of(missions, 0, robot)
-            assert view.kind is missions.scenario.kind_of(robot) and view.planar == (robot == 0)
-            assert len(view.scan.range_m) == view.kind.sensor.rays
-            wanted[robot] = view.pose + rng.uniform(-0.4, 0.4, 5)
-            wanted[robot, 4] = np.clip(wanted[robot, 4], -1.5, 1.5)
-            if view.planar:
-                wanted[robot, 2], wanted[robot, 4] = view.pose[2], 0.0
-            action = view.action_for(wanted[robot])
-            assert action.shape == (5,)
-            boxes[0, robot] = action
-        deciding = missions.state.robots[0]["deciding"].copy()
-        missions.step(boxes, np.zeros((1, 2), np.int64))
-        targets = missions.state.robots[0]["target"]
-        np.testing.assert_allclose(targets[deciding, :3], wanted[deciding, :3], atol=1e-6)
-        turned = (targets[deciding, 3] - wanted[deciding, 3] + math.pi) % (2 * math.pi) - math.pi
-        np.testing.assert_allclose(turned, 0.0, atol=1e-5)
-
-
 def test_the_threshold_asks_for_what_any_robot_can_see():
     """Robots that look level see their own layer only; with one that flies the team sees everything."""
     flat_view = dataclasses.replace(GROUND.sensor, field_of_view_rad=(math.pi, 0.0))

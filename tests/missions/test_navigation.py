@@ -12,7 +12,6 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.settings.scenarios import TERRAIN
 from entropy_explore_env.worlds.world import World
 from tests.missions.kinds import WANDERERS
 from tests.reference.scenes import free_box, random_actions, started, wander
@@ -57,23 +56,3 @@ def test_messages_of_scans_under_way_find_free_slots():
     assert missions.scenario.message_slots == 2 * 3 * (30 + 2)  # 0.05 m at 0.5 m/s is 0.1 s
     wander(missions, 30, 0)
     assert (missions.state.robots["scans"] > 100).all()
-
-
-@pytest.mark.parametrize("world", ["terrain", "terrain-rough"])
-def test_whoever_plans_knows_the_exposure_surface_and_never_meets_it(world):
-    """Flights to anywhere: those above the surface end below it with no path, and no drive runs into it."""
-    settings = {
-        "grid": Grid((40, 30, 20), 1.0),
-        "world": world,
-        "robots": 2,
-        "robot": {**PLANNED, "reach_m": math.inf},
-        "decision_period_s": None,
-        "ending": {**ENDLESS, "time_limit_s": 400.0},
-    }
-    missions = started(with_settings(TERRAIN, settings))
-    ends, rng = Counter(), np.random.default_rng(0)
-    for _ in range(60):
-        missions.step(*random_actions(missions, rng))
-        ends.update(missions.state.robots["move_end"].ravel().tolist())
-    assert ends[MoveEnd.CEILING.code] == 0
-    assert ends[MoveEnd.NO_PATH.code] > 0 and ends[MoveEnd.ARRIVED.code] > 0

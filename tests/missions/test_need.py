@@ -155,14 +155,6 @@ def test_losses_are_those_of_the_other_rule():
     assert (robots_of(by_need, "entropy_bits") < robots_of(by_utility, "entropy_bits")).all()
 
 
-def test_where_all_is_heard_at_once_all_is_known_to_all():
-    """Whole scans but for a measurement, whose bits the receipts take."""
-    by_need, by_utility = (played(burst=10_000, order=order) for order in ("need", "utility"))
-    gained = [-robots_of(each, "entropy_bits") for each in (by_need, by_utility)]
-    np.testing.assert_allclose(gained[0], gained[1], rtol=0.01)
-    assert robots_of(by_need, "measurements_sent").sum() <= robots_of(by_utility, "measurements_sent").sum()
-
-
 @pytest.mark.parametrize("channel", [{"burst": 10_000}, {}, {"range_m": 1.5, "burst": 40}])
 def test_each_measurement_is_fused_once(channel):
     """A map's precision is the prior, all own measurements, and those that were ever heard, each once."""
@@ -189,17 +181,3 @@ def test_each_measurement_is_fused_once(channel):
     np.testing.assert_allclose(
         robots_of(missions, "entropy_bits"), map_entropy_bits(missions.precision[0]), rtol=1e-6
     )
-
-
-def test_what_was_out_of_reach_is_heard_when_teammates_come_near():
-    """Nothing is lost by chance: receipts alone tell that nothing was heard."""
-    far, near = (played(120, range_m=2.5, order=order, burst=40) for order in ("utility", "need"))
-    assert robots_of(far, "messages_out_of_range").sum() > 0
-    assert robots_of(near, "entropy_bits").mean() < robots_of(far, "entropy_bits").mean()
-
-
-def test_without_it_no_state_is_kept_for_it():
-    missions = started(free_box(robots=3, channel=QUIET))
-    assert not any(array.size for name, array in missions.state._asdict().items() if "backlog" in name)
-    alone = started(free_box(robots=1, channel=NEED))
-    assert alone.state.backlog_rays.size == 0

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
-from entropy_explore_env.errors import SettingError
-from entropy_explore_env.settings.channel import Channel
 from tests.reference.scenes import free_box, started, wander
 
 NO_ANNOUNCEMENTS = {"announcements": False, "i_min_bits": 0.0}
@@ -102,17 +99,3 @@ def test_what_a_silent_radio_broadcasts_is_counted_and_heard_by_nobody():
     sent, heard = robots_of(missions, "messages_sent"), robots_of(missions, "messages_received")
     assert silenced[1] > 0 and heard[1] == 0
     assert heard[0] == sent[2] and heard[2] == sent[0]
-
-
-def test_without_phases_no_state_is_kept_for_them():
-    missions = started(free_box(robots=3))
-    wander(missions, 10, 0)
-    assert missions.rules.params["phase_s"].tolist() == [0.0] * 3
-    assert missions.state.phases.tolist() == [(0, 0)]
-    for name in ("phase_counts", "phase_batches", "phase_rays", "phase_heard"):
-        assert getattr(missions.state, name).size == 0
-
-
-def test_phases_with_a_delay_are_refused():
-    with pytest.raises(SettingError, match=r"Channel\.delay_s"):
-        Channel(phase_s=1.0, delay_s=1.0)

@@ -107,6 +107,26 @@ def test_a_reset_forgets_all_of_the_mission_before():
             assert one.tobytes() == other.tobytes(), (kind, name)
 
 
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"channel": {"burst": 0}},
+        {"robots": 1, "channel": {"content": "summaries"}},
+        {"robots": 1, "channel": {"order": "need"}},
+        {"fiducials": {"number": 2, "own_number": 5}},
+        {"robot": {"localization": {"xy_m_per_sqrt_m": 0.1}}},
+    ],
+)
+def test_what_a_scenario_does_not_ask_for_takes_no_state(changes):
+    """Of phases, need, summaries, drift, landmarks, faults and the joint map nothing is kept."""
+    state, drifts = started(free_box(**changes)).state, "robot" in changes
+    held = {name for name, array in state._asdict().items() if array.size}
+    assert held & {"estimates"} == ({"estimates"} if drifts else set())
+    others = ("phase_", "backlog", "own_", "summaries", "in_flight_parcels", "in_flight_summaries", "joint_")
+    assert not [name for name in held if name.startswith((*others, "landmarks", "fiducials", "faults"))]
+
+
 def test_what_follows_from_the_world_is_in_no_saved_state():
     missions = walked("late messages", 1)
     state = set(missions.state._fields)

@@ -120,15 +120,3 @@ def test_range_noise_changes_neither_world_nor_starts_nor_loss():
     assert (both[0]["messages_lost"] == both[1]["messages_lost"]).all()
     assert (both[0]["channel_rng"] == both[1]["channel_rng"]).all()
     assert (both[0]["sensor_rng"] != both[1]["sensor_rng"]).all()
-
-
-def test_episodes_after_a_reset_without_a_seed_go_on_from_the_last_seed():
-    scenario = free_box(world="furnished")
-    first, second = started(scenario, seed=8), started(scenario, seed=8)
-    for missions in (first, second):
-        missions.reset(0)
-    np.testing.assert_array_equal(first.state.truth, second.state.truth)
-    np.testing.assert_array_equal(first.state.robots["goal"], second.state.robots["goal"])
-    anew = started(scenario, seed=8)
-    assert (anew.state.robots["goal"] != first.state.robots["goal"]).any()
-    assert (anew.state.truth != first.state.truth).any()

@@ -227,12 +227,3 @@ def test_a_place_is_known_as_well_as_its_covariance_says():
     assert math.isinf(precision_of_place(packed, 0.5))
     pack_covariance(np.diag([0.04, 0.01, 0.0, 9.0]), packed)
     assert precision_of_place(packed, 0.5) == pytest.approx(0.25 / 0.05)  # the yaw is no part of it
-
-
-def test_without_summaries_no_state_is_kept_for_them():
-    for changes in ({}, {"channel": {"burst": 0}}, {"channel": SUMMARIES, "robots": 1}):
-        missions = started(free_box(**changes))
-        wander(missions, 10, 0)
-        for name in ("own_mean", "own_precision", "summaries", "in_flight_parcels", "in_flight_summaries"):
-            assert getattr(missions.state, name).size == 0
-        assert missions.rules.params["summary_every_s"][0] == 0.0

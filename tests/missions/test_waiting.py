@@ -58,16 +58,6 @@ def test_nothing_else_ends_a_wait():
     assert list(MoveEnd)[robots["move_end"][0]] is MoveEnd.ARRIVED
 
 
-def test_steps_of_fixed_length_wait_as_long():
-    missions = behind_a_teammate(decision_period_s=0.25)
-    deciding = []
-    for _ in range(19):
-        robots = toward(missions, FAR, STAY)
-        deciding.append(bool(robots["deciding"][0]))
-    assert deciding.index(True) in (17, 18)  # at 4.5 s, up to the body's rounding
-    assert robots["scans"][0] == 1
-
-
 def test_a_wall_is_nothing_to_wait_for_and_who_wanders_waits_for_nobody():
     missions = behind_a_teammate()
     solid = np.zeros((7, 11, 5), bool)

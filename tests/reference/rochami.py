@@ -65,17 +65,6 @@ def covered_bits(voxels: Iterable[Voxel], beliefs: dict[Voxel, Belief], sigma_kn
     return math.fsum(voxel_bits(beliefs[voxel][1], sigma_known) for voxel in voxels)
 
 
-def visibility_parameters(vectors: Iterable[Vector], yaw: float, pitch: float) -> tuple[float, float]:
-    """r̂ and α̂ of a batch of measured vectors (eq. 4)."""
-    lengths = [math.hypot(*vector) for vector in vectors]
-    gaze = rocha04.gaze(yaw, pitch)
-    cosines = [
-        sum(v * g for v, g in zip(vector, gaze, strict=True)) / length
-        for vector, length in zip(vectors, lengths, strict=True)
-    ]
-    return sum(lengths) / len(lengths), max(math.acos(max(-1.0, min(1.0, c))) for c in cosines)
-
-
 # --- The strategy (eqs. 11-13)
 
 

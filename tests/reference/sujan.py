@@ -53,14 +53,6 @@ def interest(before, visibility, beta):
     return before / math.exp(beta * visibility)
 
 
-def rating(information, pose, viewpoint, weight, occupancy, error_weight=0.0, error=0.0):
-    """Eqs. 22 and 23 with w_NI = 1 and α = 1; `error` is LE."""
-    turned = (viewpoint[3] - pose[3] + math.pi) % (2.0 * math.pi) - math.pi
-    squares = [(viewpoint[i] - pose[i]) ** 2 for i in (0, 1, 2, 4)]
-    d = math.sqrt(sum(squares) + turned**2)
-    return (information - weight * d - error_weight * error) * (1.0 - occupancy)
-
-
 def neighbours_mean(occupancy, known):
     """Occupancies of a plan with each unknown cell the mean of its neighbours, by a dense linear system."""
     x, y = occupancy.shape

@@ -17,7 +17,6 @@ from tests.reference import rochami
 from tests.reference.scenes import as_reference, drawn, random_belief, ray_space, seeds
 
 SIZE = (7, 11, 5)
-NO_BALL = np.zeros((0, 3), np.int64)
 OUR_BALL = np.zeros((1, 3), np.int64)
 """A body that touches only the voxel it is in."""
 

@@ -166,13 +166,6 @@ def test_animation_has_every_picture_and_one_palette(tmp_path: Path) -> None:
             assert np.abs(seen - shown).max() <= 8
 
 
-def test_animation_of_more_colours_than_a_palette_holds(tmp_path: Path) -> None:
-    noise = np.random.default_rng(3).integers(0, 256, (50, 70, 3), dtype=np.uint8)
-    animate([noise, noise[::-1]], tmp_path / "noise.gif", 0.02)
-    with Image.open(tmp_path / "noise.gif") as animation:
-        assert animation.n_frames == 2
-
-
 def test_a_webp_has_the_pixels_of_the_gif(tmp_path: Path) -> None:
     pictures = [picture(number) for number in (0, 5, 10)]
     shown = []

@@ -7,14 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports import painting
 from entropy_explore_env.reports.painting import (
-    RENDER_MODES,
     Painter,
-    check_render_mode,
     entropy_share,
     remaining_share,
 )
@@ -175,48 +172,6 @@ def test_without_a_mode_nothing_is_painted_and_a_warning_says_why(monkeypatch):
     with pytest.warns(UserWarning, match="give the environment render_mode"):
         assert painter.picture(missions) is None
     painter.close()
-
-
-class FakeWindow:
-    """Notes what it is shown."""
-
-    made: list[FakeWindow]
-
-    def __init__(self, **_: object) -> None:
-        self.shown: list[np.ndarray] = []
-        self.closed = 0
-        FakeWindow.made.append(self)
-
-    def show(self, rgb: np.ndarray) -> None:
-        self.shown.append(rgb)
-
-    def close(self) -> None:
-        self.closed += 1
-
-
-def test_a_human_sees_every_moment_at_once_in_one_window(monkeypatch):
-    FakeWindow.made = []
-    monkeypatch.setattr(painting, "Window", FakeWindow)
-    missions = started(free_box(robots=2), seed=3)
-    painter = Painter("human")
-    assert FakeWindow.made == []
-    watch(missions, painter, 3)
-    (window,) = FakeWindow.made
-    assert len(window.shown) == 4 and all(picture.shape == (480, 640, 3) for picture in window.shown)
-    assert painter.picture(missions) is None
-    painter.close()
-    painter.close()
-    assert window.closed == 1
-    painter.watch(missions)
-    assert len(FakeWindow.made) == 2
-
-
-def test_modes_are_checked():
-    for mode in (None, *RENDER_MODES):
-        check_render_mode(mode)
-    for mode in ("ansi", "", "RGB_ARRAY"):
-        with pytest.raises(SettingError, match=r"render_mode.*human"):
-            check_render_mode(mode)
 
 
 def test_robots_that_drift_are_drawn_where_they_believe_to_be(frames):

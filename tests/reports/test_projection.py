@@ -46,14 +46,6 @@ def test_a_plan_is_shown_as_it_is():
     np.testing.assert_array_equal(plan.coverage, np.where(share < 0.9, coverage, -1.0)[:, :, 0])
 
 
-def test_what_one_looks_at_is_not_changed():
-    share, coverage = belief()
-    before = share.copy(), coverage.copy()
-    projections(share, coverage)
-    np.testing.assert_array_equal(share, before[0])
-    np.testing.assert_array_equal(coverage, before[1])
-
-
 def test_the_top_of_a_box_shows_and_a_hall_between_floor_and_ceiling_does_not_look_like_a_wall():
     share, cover = np.zeros(SHAPE, np.float32), np.zeros(SHAPE, np.float32)
     cover[1, 1, 2] = 1.0  # a box: its top is known, what is below it is not

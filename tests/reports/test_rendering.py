@@ -294,12 +294,6 @@ def test_text_stays_in_the_picture_however_long_it_is() -> None:
         assert np.count_nonzero(np.diff(ink.astype(int)) == 1) == 8, "eight lines"
 
 
-def test_larger_pictures_have_larger_details() -> None:
-    small, large = (lay_out(SHAPE, VOXEL_M, 2, PLAIN, 2, 640 * n, 480 * n) for n in (1, 2))
-    assert (small.unit, large.unit) == (1, 2)
-    assert large.status.height == 2 * small.status.height
-
-
 @pytest.mark.parametrize("up", [1, 2])
 def test_an_ellipse_of_two_standard_deviations_is_drawn_around_an_estimate(up: int) -> None:
     """A quarter of a metre along x, half of that upwards: it reaches twice as far."""

@@ -14,11 +14,7 @@ from scipy import ndimage
 from entropy_explore_env.belief.paths.lattice import NO_FLY_NOWHERE
 from entropy_explore_env.robots.motion import (
     MoveEnd,
-    SpeedProfile,
-    driven_share,
-    driving_time,
     line_believed_blocked,
-    time_after,
 )
 from entropy_explore_env.robots.navigator import lattice_of, new_navigator, plan_path
 from entropy_explore_env.settings.grid import Grid
@@ -54,23 +50,6 @@ def wall(open_from=9, shape=FLAT.shape):
     return solid
 
 
-def test_through_known_free_space_it_is_one_line():
-    points, end = plan(planner(), wall(), (1.2, 1.7, 0.5), (2.9, 10.1, 0.5))
-    assert (points.tolist(), end) == ([[2.9, 10.1, 0.5]], MoveEnd.ARRIVED)
-    points, end = plan(planner(), wall(), (1.2, 1.7, 0.5), (1.2, 1.7, 0.5))
-    assert (points.tolist(), end) == ([[1.2, 1.7, 0.5]], MoveEnd.ARRIVED)
-
-
-def test_around_a_wall():
-    points, end = plan(planner(), wall(), (1.5, 1.5, 0.5), (5.2, 1.9, 0.5))
-    assert (points.tolist(), end) == ([[2.5, 9.5, 0.5], [4.5, 9.5, 0.5], [5.2, 1.9, 0.5]], MoveEnd.ARRIVED)
-
-
-def test_a_path_with_more_corners_than_places_ends_at_the_last_of_them():
-    points, end = plan(planner(), wall(), (1.5, 1.5, 0.5), (5.5, 1.5, 0.5), places=2)
-    assert (points.tolist(), end) == ([[2.5, 9.5, 0.5], [4.5, 9.5, 0.5]], MoveEnd.CORNERS)
-
-
 @pytest.mark.parametrize(("cost", "corners"), [(1.0, 0), (3.0, 0), (6.0, 2)])
 def test_unknown_space_is_passed_where_the_path_around_costs_more(cost, corners):
     """Two unknown columns on the line of four edges cost 2·cost + 2; around them it is about 10."""
@@ -84,40 +63,39 @@ def test_unknown_space_is_passed_where_the_path_around_costs_more(cost, corners)
     assert (points[:, 1].max() > 5.0) == (corners > 0)
 
 
-@pytest.mark.parametrize(
-    ("goal", "nearest"),
-    [
-        ((3.5, 4.2, 0.5), (2.5, 4.5, 0.5)),  # in the wall: of both sides the first
-        ((5.5, 4.5, 0.5), (2.5, 4.5, 0.5)),  # behind it
-        ((-0.7, 4.5, 0.5), (0.5, 4.5, 0.5)),  # outside
-        ((1.5, 13.0, 0.5), (1.5, 10.5, 0.5)),
-    ],
-)
-def test_where_no_path_is_known_it_leads_to_the_nearest_place(goal, nearest):
-    points, end = plan(planner(), wall(open_from=11), (1.5, 1.5, 0.5), goal)
-    assert end is MoveEnd.NO_PATH
-    assert points[-1].tolist() == list(nearest)
-
-
-@pytest.mark.parametrize(
-    ("free", "start", "goal", "nearest"),
-    [
-        (np.s_[6:], (6.5, 1.5, 0.5), (5.5, 8.5, 0.5), (6.5, 8.5, 0.5)),
-        (np.s_[:1], (0.5, 1.5, 0.5), (1.5, 8.5, 0.5), (0.5, 8.5, 0.5)),
-        (np.s_[:, 10:], (1.5, 10.5, 0.5), (5.5, 9.5, 0.5), (5.5, 10.5, 0.5)),
-        (np.s_[:, :1], (1.5, 0.5, 0.5), (5.5, 1.5, 0.5), (5.5, 0.5, 0.5)),
-    ],
-)
-def test_the_nearest_place_may_be_at_the_edge_of_the_workspace(free, start, goal, nearest):
+def only(free):
     solid = np.ones(FLAT.shape, bool)
     solid[free] = False
-    points, end = plan(planner(), solid, start, goal)
-    assert (points.tolist(), end) == ([list(nearest)], MoveEnd.NO_PATH)
+    return solid
 
 
-def test_who_cannot_get_nearer_stays_where_it_is():
-    points, end = plan(planner(), wall(open_from=11), (2.7, 4.6, 0.5), (5.5, 4.5, 0.5))
-    assert (points.tolist(), end) == ([[2.7, 4.6, 0.5]], MoveEnd.NO_PATH)
+OPEN, SHUT = wall(), wall(open_from=11)
+AROUND = [(2.5, 9.5, 0.5), (4.5, 9.5, 0.5)]
+PLANS = [
+    # Through known free space it is one line, around a wall one with two corners.
+    (OPEN, (1.2, 1.7, 0.5), (2.9, 10.1, 0.5), 32, [(2.9, 10.1, 0.5)], MoveEnd.ARRIVED),
+    (OPEN, (1.2, 1.7, 0.5), (1.2, 1.7, 0.5), 32, [(1.2, 1.7, 0.5)], MoveEnd.ARRIVED),
+    (OPEN, (1.5, 1.5, 0.5), (5.2, 1.9, 0.5), 32, [*AROUND, (5.2, 1.9, 0.5)], MoveEnd.ARRIVED),
+    # One with more corners than places ends at the last of them.
+    (OPEN, (1.5, 1.5, 0.5), (5.5, 1.5, 0.5), 2, AROUND, MoveEnd.CORNERS),
+    # Where no path is known it leads to the nearest place: goals in the wall, behind it and outside.
+    (SHUT, (1.5, 1.5, 0.5), (3.5, 4.2, 0.5), 32, [(2.5, 4.5, 0.5)], MoveEnd.NO_PATH),
+    (SHUT, (1.5, 1.5, 0.5), (5.5, 4.5, 0.5), 32, [(2.5, 4.5, 0.5)], MoveEnd.NO_PATH),
+    (SHUT, (1.5, 1.5, 0.5), (-0.7, 4.5, 0.5), 32, [(0.5, 4.5, 0.5)], MoveEnd.NO_PATH),
+    (SHUT, (1.5, 1.5, 0.5), (1.5, 13.0, 0.5), 32, [(1.5, 10.5, 0.5)], MoveEnd.NO_PATH),
+    # The robot stays where it cannot get nearer, and the nearest place may be at any edge.
+    (SHUT, (2.7, 4.6, 0.5), (5.5, 4.5, 0.5), 32, [(2.7, 4.6, 0.5)], MoveEnd.NO_PATH),
+    (only(np.s_[6:]), (6.5, 1.5, 0.5), (5.5, 8.5, 0.5), 32, [(6.5, 8.5, 0.5)], MoveEnd.NO_PATH),
+    (only(np.s_[:1]), (0.5, 1.5, 0.5), (1.5, 8.5, 0.5), 32, [(0.5, 8.5, 0.5)], MoveEnd.NO_PATH),
+    (only(np.s_[:, 10:]), (1.5, 10.5, 0.5), (5.5, 9.5, 0.5), 32, [(5.5, 10.5, 0.5)], MoveEnd.NO_PATH),
+    (only(np.s_[:, :1]), (1.5, 0.5, 0.5), (5.5, 1.5, 0.5), 32, [(5.5, 0.5, 0.5)], MoveEnd.NO_PATH),
+]
+
+
+@pytest.mark.parametrize(("solid", "start", "goal", "places", "expected", "end"), PLANS)
+def test_plans_by_hand(solid, start, goal, places, expected, end):
+    points, found = plan(planner(), solid, start, goal, places=places)
+    assert (points.tolist(), found) == ([list(point) for point in expected], end)
 
 
 DRIFT = {"xy_m_per_sqrt_m": 0.01}
@@ -265,13 +243,3 @@ def test_what_lies_within_the_body_s_reach_blocks_a_line():
     assert not blocked((4, 1, 0), 1.5)  # it touches that already, and leaves
     assert blocked((4, 2, 0), 1.5)  # that, too, but it would touch it still where it touched nothing
     assert blocked((3, 2, 0), 1.5)  # not through it
-
-
-@drawn(100)
-@given(st.floats(1e-3, 50.0), st.floats(0.0, 1.0), st.floats(0.1, 3.0), st.floats(0.1, 3.0))
-def test_the_time_of_a_place_on_the_path_is_when_the_robot_is_there(length, share, speed, acceleration):
-    time_s = time_after(share * length, SpeedProfile(length, 0.0, speed, acceleration))
-    assert 0.0 <= time_s <= driving_time(length, speed, acceleration) + 1e-9
-    assert driven_share(time_s, SpeedProfile(length, 0.0, speed, acceleration)) == pytest.approx(
-        share, abs=1e-6
-    )

@@ -20,6 +20,7 @@ from entropy_explore_env.robots.landmarks import (
 from entropy_explore_env.robots.localization import ESTIMATE
 from tests.reference import localization as reference
 from tests.reference.scenes import drawn, seeds
+from tests.robots.test_pose_estimates import random_covariance
 
 PRIOR = np.float32(30.0**-2)
 KNOWN = np.float32(400.0)
@@ -64,11 +65,6 @@ def test_scores_are_the_reference_s(seed):
         mean.astype(float), precision.astype(float), float(PRIOR), voxel, occupancy_probability
     )
     assert score(mean, precision, voxel) == pytest.approx(wanted, abs=1e-12)
-
-
-def random_covariance(rng, scale=1.0):
-    root = rng.normal(size=(4, 4)) * scale * np.array([[1.0], [1.0], [0.5], [0.2]])
-    return root @ root.T
 
 
 def situation(rng, added):

@@ -261,7 +261,7 @@ def test_a_body_in_front_of_the_wall_leaves_no_measurement():
     scan.order[:] = [0, 1, 2]
     fuse_scan(scan, 3, mean.ravel(), precision.ravel())
     assert (precision[3, 8:, 2] == 1.0).all()  # what only the middle ray crosses: 5° are ½ voxel there
-    assert scan.utility[1] == 0.0
+    assert scan.utility[1] == 0.0 == scan.rays["range_m"][1]  # nothing of what stands behind the body
 
 
 def test_a_body_behind_an_obstacle_hides_nothing():

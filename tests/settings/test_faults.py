@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import pytest
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.changes import with_settings
-from entropy_explore_env.settings.channel import Signal
-from entropy_explore_env.settings.faults import Faults, Outage, RadioFault, SensorFault
-from entropy_explore_env.settings.json import scenario_of, settings_of
+from entropy_explore_env.settings.faults import Faults
 from entropy_explore_env.settings.scenarios import BOX
 
 TEAM = with_settings(BOX, {"robots": 3})
@@ -49,25 +45,3 @@ def test_nothing_goes_wrong_by_default():
     assert not with_settings(
         TEAM, {"faults": {"stop": {"lasts_s": 3.0}, "radio": {"late_s": 1.0}}}
     ).faults.happen
-
-
-def test_they_go_through_json_without_loss():
-    faults = Faults(
-        Outage(at_s=3.0, robots=(1, 2)),
-        Outage(mean_s=7.5, lasts_s=2.0),
-        Outage(0.1, 0.2, 0.3, (0,)),
-        SensorFault(0.1, 1.02, -0.05, (2,)),
-        RadioFault(0.1, 0.2, 0.3, 4.0, (0, 1)),
-    )
-    channel = {
-        "reach": "signal",
-        "signal": {"exponent": 3.0, "budget_db": 55.0},
-    }
-    scenario = with_settings(
-        TEAM, {"faults": faults, "channel": channel, "ending": {"termination": "shared"}}
-    )
-    again = scenario_of(settings_of(scenario))
-    assert again == scenario and again.faults == faults
-    assert again.channel.signal == Signal(exponent=3.0, budget_db=55.0)
-    bare = dataclasses.replace(scenario, faults=Faults())
-    assert bare != scenario and scenario_of(settings_of(bare)) == bare

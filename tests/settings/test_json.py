@@ -22,10 +22,24 @@ from entropy_explore_env.settings.scenarios import BOX, ROOM, SCENARIOS
 from entropy_explore_env.settings.sensor import RangeSensor
 from tests.reference.scenes import drawn
 
+RARE = {
+    "robots": 3,
+    "robot": {"localization": {"xy_m_per_sqrt_m": 0.05, "margin_m": 0.1}},
+    "fiducials": {"positions_m": ((1.0, 1.0, 1.0), (0.5, 2.0, 0.25)), "range_m": 4.0},
+    "faults": {
+        "stop": {"at_s": 3.0, "robots": (1, 2)},
+        "blind": {"mean_s": 7.5, "lasts_s": 2.0},
+        "silent": {"at_s": 0.1, "mean_s": 0.2, "lasts_s": 0.3, "robots": (0,)},
+        "sensor": {"lost_rays": 0.1, "range_factor": 1.02, "range_bias_m": -0.05, "robots": (2,)},
+        "radio": {"garbled": 0.1, "repeated": 0.2, "late": 0.3, "late_s": 4.0, "robots": (0, 1)},
+    },
+    "channel": {"reach": "signal", "signal": {"exponent": 3.0, "budget_db": 55.0}},
+    "ending": {"termination": "shared"},
+}
 
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_named_scenarios_come_back_as_they_were(name):
-    scenario = SCENARIOS[name]
+
+@pytest.mark.parametrize("scenario", [*SCENARIOS.values(), with_settings(BOX, RARE)])
+def test_scenarios_come_back_as_they_were(scenario):
     text = json.dumps(settings_of(scenario))
     back = scenario_of(json.loads(text, parse_constant=pytest.fail))
     assert back == scenario and hash(back) == hash(scenario)

@@ -380,17 +380,7 @@ def test_scenarios_are_frozen_and_found_by_name(scenario):
     assert scenario.agents == tuple(f"robot_{robot}" for robot in range(scenario.robots))
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "castle",
-        "Room",
-        "",
-        None,
-        3,
-        ["room"],
-    ],
-)
+@pytest.mark.parametrize("name", ["castle", "Room", "", None, 3, ["room"]])
 def test_a_scenario_that_nobody_knows(name):
     error = refusal(lambda: find_scenario(name))
     assert (error.field, error.value) == ("scenario", name)

@@ -25,7 +25,6 @@ from training.advantages import DecisionBuffer
 from training.checkpoints import checkpoint_name, latest_checkpoint, load_checkpoint
 from training.validation import Validator
 
-ROOT = Path(__file__).parents[2]
 TINY = (
     "--scenario box-7x11x5 --robots 2 --missions 3 --threads 1 --rollout-steps 16 --batch 16 --epochs 2 "
     "--hidden 8 8 --validation-missions 1 --time-limit-s 40 --validate-every 150 --checkpoint-every 90 --json"
@@ -80,15 +79,6 @@ def test_a_run_changes_all_weights_and_writes_its_files(uninterrupted):
     assert list(out.glob("events.out.tfevents.*"))
     first, last = (load_checkpoint(folder).weights for folder in sorted(out.glob("step-*")))
     assert all(not torch.equal(first[name], last[name]) for name in first if name.endswith("weight"))
-
-
-def test_robots_that_decide_under_way_are_trained_and_go_on(tmp_path):
-    """With `redecide`, robots choose while they drive; a run keeps it, and its policy acts so."""
-    under_way = ["--robot.redecide", "on_scan", "--sensor.scan-every-m", "0.4"]
-    assert learn(tmp_path / "run", *under_way, steps=192) == 0
-    assert resume(tmp_path / "run", "--total-steps", "384") == 0
-    learned = load_checkpoint(latest_checkpoint(tmp_path / "run", "step")).settings.scenario
-    assert learned.robot.redecide == "on_scan" and learned.sensor.scan_every_m == 0.4
 
 
 def test_missions_get_shorter_than_those_of_fresh_weights(tmp_path):
