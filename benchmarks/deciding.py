@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 
 import numpy as np
@@ -10,11 +11,11 @@ import numpy as np
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Stopwatch
-from baselines.suites.bundled_worlds import in_world
+from baselines.suites.public_worlds import fetch_worlds, in_world
 from benchmarks.planning import FLOOR, cluttered
 from benchmarks.rows import Effort, Goal, Row, alone, timed
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import counted
+from entropy_explore_env.errors import EntropyExploreError, counted
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenario import Scenario
@@ -39,12 +40,19 @@ _FLOOR_SHARE, _FLOOR_EDGE_M = 0.16, 0.03
 def deciding_rows(effort: Effort) -> list[Row]:
     """Return a decision of each strategy that has a limit.
 
-    In the warehouse `planned-rate` decides at every scan under way: by openings until the map has little
-    entropy, and by tours where all has to be seen.
+    In the warehouse, a public world, `planned-rate` decides at every scan under way: by openings until the
+    map has little entropy, and by tours where all has to be seen. Where the world cannot be fetched, these
+    rows are left out, with the reason on standard error.
     """
     steps, few = effort.steps, min(effort.steps, _LARGE_STEPS)
     warehouse = in_world(OFFICE, "warehouse", _UNDER_WAY)
     whole = with_settings(warehouse, {"name": "warehouse to be seen whole", "ending": {"seen_share": 1.0}})
+    plans = [warehouse, whole]
+    try:
+        fetch_worlds(plans)
+    except EntropyExploreError as error:
+        print(f"no rows of the warehouse: {error}", file=sys.stderr)
+        plans = []
     return [
         decision_row(ROOM, 3, "planned-rate", steps, 5.0),
         decision_row(OFFICE, 1, "planned-rate", steps, 10.0),
@@ -52,7 +60,7 @@ def deciding_rows(effort: Effort) -> list[Row]:
         decision_row(LAB, 10, "mutual-information", steps, 5.0),
         decision_row(_LARGE_CLIFF, 1, "cliff-next-best-view", few, 50.0),
         decision_row(_LARGE_PLAN, 1, "next-best-view", few, 50.0),
-        *(decision_row(plan, 1, "planned-rate", steps, 50.0) for plan in (warehouse, whole)),
+        *(decision_row(plan, 1, "planned-rate", steps, 50.0) for plan in plans),
     ]
 
 

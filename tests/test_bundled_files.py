@@ -49,10 +49,3 @@ def test_every_bundled_file_has_a_row():
 def test_every_row_is_of_files_that_are_there():
     assert len(patterns()) > 10
     assert [each for each in patterns() if not [*ROOT.glob(each.removesuffix("/*"))]] == []
-
-
-def test_the_licence_of_every_world_of_others_is_here():
-    page = (ROOT / "baselines" / "suites" / "worlds" / "README.md").read_text(encoding="utf-8")
-    texts = "".join(path.read_text(encoding="utf-8") for path in (ROOT / "baselines").rglob("LICENSES/*.txt"))
-    holders = re.findall(r"© [\d–]+ ([^|]+?) \|", page)
-    assert len(holders) == 3 and [holder for holder in holders if holder not in texts] == []

@@ -48,8 +48,8 @@ class TaskOptions:
     """Scenario as JSON, or a file of it such as a mission.json: all of its settings, or some that change the
     named scenario. Options change it further."""
     world: tuple[str, ...] = ()
-    """World files in place of the scenario's worlds, dealt to missions in turn by their seeds. `python -m
-    entropy_explore_env worlds list` shows the kinds."""
+    """World files or public worlds, dealt to missions in turn. `python -m entropy_explore_env worlds list`
+    shows what there is."""
     voxel_size_m: float | None = None
     """Size to which the voxels of world files are resampled; default: the scenario's."""
     world_file: Annotated[Reading, Mark.INLINE] = field(default_factory=Reading)

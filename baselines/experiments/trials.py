@@ -6,6 +6,7 @@ the trial whatever code made it, unless it is to be run again.
 
 from __future__ import annotations
 
+import csv
 import dataclasses
 import enum
 import hashlib
@@ -272,7 +273,7 @@ def _cell_settings(cell: Cell) -> dict[str, Any]:
     }
     if cell.surroundings is not None:
         settings["surroundings"] = described(cell.surroundings.without_folders())
-        settings["files"] = [_file_digest(file) for file in cell.surroundings.files()]
+        settings["files"] = [_file_digest(file) for file in cell.surroundings.files() if file.suffix]
     if outside := _strategy_files(cell.strategy):
         settings["strategy_files"] = [_file_digest(file) for file in outside]
     return settings
@@ -280,7 +281,17 @@ def _cell_settings(cell: Cell) -> dict[str, Any]:
 
 def described_scenario(cell: Cell) -> dict[str, Any]:
     """Return the scenario of a cell as rows hold it."""
-    return described(dataclasses.replace(scripted(cell.scenario), reward=Reward()))
+    found = described(dataclasses.replace(scripted(cell.scenario), reward=Reward()))
+    if cell.scenario.world in (former := _former_files()):
+        found["world"] = former[cell.scenario.world]
+    return found
+
+
+@lru_cache(maxsize=1)
+def _former_files() -> dict[str, list[str]]:
+    """Return name and digest of the files that some public worlds once were: all their rows hold them."""
+    with Path(__file__).with_name("row_worlds.csv").open(newline="") as table:
+        return {row["world"]: [row["file"], row["digest"]] for row in csv.DictReader(table)}
 
 
 def described(value: Any) -> Any:  # noqa: ANN401 - whatever a setting may be

@@ -23,6 +23,7 @@ from baselines.experiments.rows import Record, Row, read_table, write_table
 from baselines.experiments.trials import Cell, CellTrial, How, described_scenario, environment
 from baselines.experiments.worker_pool import Failure, run_each
 from baselines.suites import find_suite
+from baselines.suites.public_worlds import fetch_worlds
 from baselines.suites.results import by_seed
 from baselines.suites.running import run_suite
 from baselines.suites.suite import Suite
@@ -176,10 +177,12 @@ def check_entry(folder: Path, workers: int | RayCluster) -> tuple[About, list[Ve
 
     Raises:
         SettingError: The folder is no entry that can be read.
+        WorldError: A public world of its suite cannot be fetched.
     """
     about, rows = read_about(folder), read_table(folder / ROWS)
     suite = find_suite(about.suite, about.quick, about.strategies).completed(by_seed(rows))
     named = {(row.cell, row.seed): row for row in rows}
+    fetch_worlds(cell.scenario for cell in suite.cells)
     claimed = [
         Claimed(trial.point, trial.seed, named.pop((trial.cell, trial.seed), None), file)
         for trial in sorted(suite.trials, key=lambda trial: (trial.cell, trial.seed))

@@ -27,6 +27,7 @@ from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import SCENARIOS, find_scenario
 from entropy_explore_env.worlds.formats import FORMATS
 from entropy_explore_env.worlds.given import GIVEN, distinct_names
+from entropy_explore_env.worlds.public.table import PUBLIC
 
 DEFAULT_SCENARIOS, QUICK_SCENARIOS = "room,room-furnished,lab,office,cave", "room,office"
 MOST_ROBOTS = 1000
@@ -170,7 +171,9 @@ def default_sizes(options: TaskOptions, quick: bool) -> str:
 
 
 def is_plan(path: Path) -> bool:
-    """Return whether a file is a floor plan, which ground robots explore."""
+    """Return whether a file or a public world is a floor plan, which ground robots explore."""
+    if str(path) in PUBLIC:
+        return PUBLIC[str(path)].grid.flat
     return path.suffix.lower() in _PLANS
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from baselines.experiments.rows import Row
 from baselines.experiments.trials import Cell, CellTrial, How, run_trials
+from baselines.suites.public_worlds import fetch_worlds
 from baselines.suites.results import by_seed
 from baselines.suites.suite import Suite
 
@@ -31,8 +32,12 @@ def run_suite(
 
     Returns:
         The row of each mission; None where the time was up.
+
+    Raises:
+        WorldError: A public world cannot be fetched: no mission is run.
     """
     began_s = time.monotonic()
+    fetch_worlds(cell.scenario for cell in suite.cells)
     found = run_trials([trial_of(trial.point, trial.seed) for trial in suite.trials], table, how, known)
     if suite.later is None:
         return found

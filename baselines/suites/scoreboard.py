@@ -18,17 +18,19 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from baselines.suites.bundled_worlds import dungeons, in_world
+from baselines.suites.public_worlds import in_world
 from baselines.suites.suite import QUICK_STARTS, STARTS, Place, Task, task_in, team_name
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import SCENARIOS
+from entropy_explore_env.worlds.public.table import PUBLIC
 
 PLANS = ("office", "corridor", "cluttered", "hybrid")
 PLAN_FILES = ("depot", "warehouse", "willow")
 SCAN_EVERY_M, ANGULAR_STEP_RAD = 0.5, math.pi / 360
 PLAN_LIMIT_S = 7200.0
 DUNGEON_UNSEEN = 250
+_DUNGEON = "dungeon-"
 QUICK_PLANS, QUICK_DUNGEONS = 2, 2
 
 VOLUMES = ("room", "room-furnished", "office", "office-3d", "cave", "terrain")
@@ -95,15 +97,22 @@ def _explored(scenario: Scenario, ending: Mapping[str, Any]) -> Scenario:
 
 def _dungeon_task(count: int | None) -> Task:
     """Return the task of the first dungeons; None = of all."""
-    chosen = dungeons()[:count]
+    chosen = [name for name in PUBLIC if name.startswith(_DUNGEON)][:count]
     far = {"robot": {"reach_m": 8.0}, "sensor": {"max_range_m": 8.0}, "track_truth": True}
     base = with_settings(_explored(SCENARIOS["office"], {"unseen_free_voxels": DUNGEON_UNSEEN}), far)
-    first = in_world(base, f"dungeons/{chosen[0].name}")
+    there = [dataclasses.replace(in_world(base, name), name="dungeon") for name in chosen]
     places = (
-        Place(each.name, dataclasses.replace(first, name="dungeon", world=each.world), 1, each.start)
-        for each in chosen  # all have the same grid
+        Place(name.removeprefix(_DUNGEON), scenario, 1, _marked_start(name))
+        for name, scenario in zip(chosen, there, strict=True)
     )
     return Task("dungeons", tuple(places))
+
+
+def _marked_start(name: str) -> tuple[float, float, float, float, float]:
+    """Return the pose at a world's start mark, in the middle of the one layer of voxels."""
+    world = PUBLIC[name]
+    assert world.start_m is not None
+    return (*world.start_m, world.grid.voxel_size_m / 2, 0.0, 0.0)
 
 
 def volume_tasks(quick: bool = False) -> tuple[Task, ...]:

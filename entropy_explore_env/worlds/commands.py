@@ -12,22 +12,24 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 
 from entropy_explore_env.command import LineParser
-from entropy_explore_env.errors import SettingError, one_of
+from entropy_explore_env.errors import SettingError, did_you_mean
 from entropy_explore_env.randomness import Stream, check_seed, generator
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import SCENARIOS
 from entropy_explore_env.settings.validation import is_whole
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
-from entropy_explore_env.worlds.formats import FORMATS, WORDS
+from entropy_explore_env.worlds.formats import FORMATS, NAMES, WORDS
 from entropy_explore_env.worlds.given import in_given_worlds
 from entropy_explore_env.worlds.load import load_world, make_world, save_world
 from entropy_explore_env.worlds.pictures import picture
+from entropy_explore_env.worlds.public.table import PUBLIC
 from entropy_explore_env.worlds.recipes.catalogue import about_recipe
 from entropy_explore_env.worlds.world import World
 from entropy_explore_env.writing import write_atomically
@@ -76,6 +78,9 @@ def main(words: Sequence[str]) -> int:
     else:
         save_world(world, target)
     print(f"{target}: {about}")
+    if args.source in PUBLIC:
+        source = PUBLIC[args.source].source
+        print(f"licence: {source.licence}\ncite: {source.citation}")
     return 0
 
 
@@ -120,6 +125,10 @@ def _list(folder: Path | None) -> None:
         for name, scenario in SCENARIOS.items():
             print(f"{name}\tscenario\t{about_recipe(scenario.world)}")
         print(f"{JACKSBORO}\televation model\tcomes with matplotlib")
+        for about, named in groupby(PUBLIC, lambda name: PUBLIC[name].about):
+            first, *others = named
+            names = f"{first} … {others[-1]}" if others else first
+            print(f"{names}\tpublic world\t{about}; {PUBLIC[first].source.licence}")
         for suffix, form in FORMATS.items():
             print(f"*{suffix}\tfile\t{form.kind}")
         return
@@ -139,8 +148,10 @@ def _world(args: argparse.Namespace) -> World:
     given |= {"negate": args.negate, "inside": args.inside}
     if args.source not in SCENARIOS:
         _refuse(args, _OF_SCENARIOS, "no value for a file")
-        if not Path(args.source).suffix and args.source != JACKSBORO:
-            raise SettingError("source", args.source, f"a world file, or {one_of(args.source, SCENARIOS)}")
+        if not Path(args.source).suffix and args.source not in NAMES:
+            allowed = "a world file, or a name that `worlds list` shows"
+            allowed += did_you_mean(args.source, (*SCENARIOS, *NAMES))
+            raise SettingError("source", args.source, allowed)
         return load_world(args.source, **given)
     for name, value in given.items():
         if value is not None:

@@ -8,8 +8,10 @@ from typing import Any, TypedDict
 
 from entropy_explore_env.errors import SettingError, WorldError, did_you_mean, one_of
 from entropy_explore_env.settings.validation import is_number
+from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
 from entropy_explore_env.worlds.files.map_server import RULES
 from entropy_explore_env.worlds.files.process import Format
+from entropy_explore_env.worlds.public.table import PUBLIC
 
 OCTOMAP = Format("octomap_tree", "OctoMap tree", memory_per_byte=512)
 _MAP_SERVER = Format("map_server", "YAML of map_server with its image")
@@ -38,6 +40,8 @@ FORMATS = {
     ".asc": Format("esri_grid", "ESRI ASCII grid"),
 }
 """Suffix in lower case → how the file is read."""
+NAMES = (JACKSBORO, *PUBLIC)
+"""What stands for a world as a file does: names have no suffix, files have one."""
 _TO_CONVERT = {
     ".npy": "a = numpy.load(path); World(Grid(a.shape, 0.05), a > 0, 'name'), with a of three axes",
     **dict.fromkeys((".fbx", ".blend", ".3ds", ".ifc", ".step", ".stp"), "export it as .glb or .obj"),
@@ -85,7 +89,7 @@ def format_of(path: Path) -> Format:
     if suffix in FORMATS:
         return FORMATS[suffix]
     kinds = "a file of one of the kinds " + " ".join(FORMATS)
-    line = f"; convert it: {_TO_CONVERT[suffix]}" if suffix in _TO_CONVERT else ""
+    line = f"; convert it: {_TO_CONVERT[suffix]}" if suffix in _TO_CONVERT else did_you_mean(str(path), NAMES)
     raise WorldError("world file", str(path), kinds + line)
 
 

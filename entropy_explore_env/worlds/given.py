@@ -15,9 +15,8 @@ from entropy_explore_env.errors import SettingError, WorldError, WorldWarning
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenario import Scenario
-from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
 from entropy_explore_env.worlds.files.voxels import box_of_use, cropped_note
-from entropy_explore_env.worlds.formats import FORMATS
+from entropy_explore_env.worlds.formats import FORMATS, NAMES
 from entropy_explore_env.worlds.load import world_from_file
 from entropy_explore_env.worlds.world import World, part_of
 
@@ -114,7 +113,7 @@ def _from_list(scenario: Scenario, asked: object) -> tuple[World, ...]:
 
 
 def _names_a_file(word: object) -> bool:
-    return isinstance(word, str) and (word == JACKSBORO or Path(word).suffix.lower() in FORMATS)
+    return isinstance(word, str) and (word in NAMES or Path(word).suffix.lower() in FORMATS)
 
 
 def _without_margins(world: World) -> World:

@@ -31,11 +31,14 @@ from entropy_explore_env.worlds.formats import (
     FORMATS,
     IMAGE,
     JACKSBORO_FORMAT,
+    NAMES,
     OCTOMAP,
     LoadOptions,
     check_options,
     format_of,
 )
+from entropy_explore_env.worlds.public.fetching import public_file
+from entropy_explore_env.worlds.public.table import PUBLIC, PublicWorld
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.recipes.rooms import empty
 from entropy_explore_env.worlds.splits import draw_world_number, world_generator
@@ -56,13 +59,15 @@ def load_world(
 
     By suffix: OctoMap (`.bt`, `.ot`), map_server (`.yaml`, `.yml`), plans as images and 16-bit height maps
     (`.png`, `.pgm`, `.jpg`, `.bmp`, `.gif`), point clouds (`.pcd`, `.ply`), meshes (`.obj`, `.stl`, `.glb`,
-    `.ply`), height maps (`.npz`, `.tif`, `.tiff`), worlds of `save_world` (`.npz`); and matplotlib's
-    elevation model by the name `jacksboro`. Each format is described in its file in `worlds/files`. Settings
-    that do not apply to a file are refused.
+    `.ply`), height maps (`.npz`, `.tif`, `.tiff`), worlds of `save_world` (`.npz`). By name, without a
+    suffix: matplotlib's elevation model `jacksboro`, and public worlds (`worlds/public/table.py`), whose
+    files are fetched once. Each format is described in its file in `worlds/files`. Settings that do not apply
+    to a file are refused.
 
     Args:
-        path: The file, or `jacksboro`.
-        voxel_size_m: Edge of the voxels wanted; None = the file's own, which clouds and meshes do not have.
+        path: The file, `jacksboro`, or the name of a public world.
+        voxel_size_m: Edge of the voxels wanted; None = the file's own, which clouds and meshes do not have;
+            of a public world that of its table.
             Where voxels are resampled, one is free if at least half of it is known to be free and less than
             a quarter of it is occupied, so that thin walls stay.
         height_m: Plans are extruded to this height; None = they stay 2-D.
@@ -91,7 +96,8 @@ def load_world(
             where the system has /proc, as Linux does; on macOS and Windows memory is not limited.
 
     Raises:
-        WorldError: The file is missing, too large, broken, of no known kind or has no free space.
+        WorldError: The file is missing, too large, broken, of no known kind or has no free space, or a public
+            world cannot be fetched.
         SettingError: A setting is unknown, out of its range, missing, or does not apply to this file.
         MissingExtraError: The package that reads this format is not installed.
 
@@ -117,9 +123,20 @@ def _load(path: Path | str, options: dict[str, Any], form: Format | None = None)
     path = checked_path("world file", path)
     if form is None and str(path) == JACKSBORO:
         voxels = read_apart(JACKSBORO_FORMAT, JACKSBORO, options, limits)
+    elif form is None and str(path) in PUBLIC:
+        options = _with_defaults(PUBLIC[str(path)], options)
+        file = public_file(str(path))
+        voxels = read_apart(format_of(file), file, options, limits)
+        voxels = dataclasses.replace(voxels, name=str(path), notes=())  # its table says how it is meant
     else:
         voxels = read_apart(form or format_of(path), path.absolute(), options, limits)
     return _world(voxels, str(path), options["voxel_size_m"], height_m)
+
+
+def _with_defaults(world: PublicWorld, options: dict[str, Any]) -> dict[str, Any]:
+    """Return the options of reading a public world: those given, else those of its table."""
+    given = {name: value for name, value in options.items() if value is not None}
+    return {"voxel_size_m": world.grid.voxel_size_m, **world.options, **given}
 
 
 def save_world(world: World, path: Path | str) -> None:
@@ -263,13 +280,13 @@ def world_from_file(path: Path | str, voxel_size_m: float, **options: Any) -> Wo
         WorldError: It cannot be read.
     """
     path = checked_path("Scenario.world", path)
-    if str(path) != JACKSBORO and path.suffix.lower() not in FORMATS:
+    if str(path) not in NAMES and path.suffix.lower() not in FORMATS:
         files = ", ".join(f"*{suffix}" for suffix in FORMATS)
-        allowed = f"a recipe ({', '.join(RECIPES)}), a file ({files}) or, to an environment, a World"
-        raise SettingError("Scenario.world", str(path), allowed + did_you_mean(str(path), RECIPES))
+        allowed = f"a recipe ({', '.join(RECIPES)}), a public world, a file ({files}) or a World"
+        raise SettingError("Scenario.world", str(path), allowed + did_you_mean(str(path), (*RECIPES, *NAMES)))
     options["voxel_size_m"] = voxel_size_m
     check_options(options)
-    path = path if str(path) == JACKSBORO else path.resolve()
+    path = path if str(path) in NAMES else path.resolve()
     return _cached_world(path, _file_version(path), tuple(sorted(options.items())))
 
 

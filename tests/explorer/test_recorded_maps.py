@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from baselines.experiments.mission import scripted
-from baselines.suites.bundled_worlds import in_world
+from baselines.suites.public_worlds import in_world
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.explorer.explorer import Explorer
 from entropy_explore_env.explorer.planned_rate import PlannedRate
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import SCENARIOS
+from tests.public_worlds import needs_public_worlds
 
 SEEN = {"ending": {"seen_share": 0.99}}
 
@@ -36,6 +37,7 @@ def check_goals(scenario, decisions, **world):
     ("world", "scenario", "settings"),
     [
         (None, "cave", SEEN),
+        (None, "hybrid", SEEN),
         ("warehouse", "office", SEEN),
         ("geb079", "office-3d", {}),
     ],
@@ -43,4 +45,6 @@ def check_goals(scenario, decisions, **world):
 )
 def test_in_offices_caves_and_buildings(world, scenario, settings):
     task = SCENARIOS[scenario]
+    if world is not None:
+        needs_public_worlds(world)
     check_goals(with_settings(task, settings) if world is None else in_world(task, world, settings), 6)

@@ -168,7 +168,7 @@ def test_missions_check_the_worlds_that_they_are_given():
         Missions(free_box(), given=("office",))
     with pytest.raises(WorldError, match=r"world\[1\]"):
         in_given_worlds(free_box(), [WORLDS[0], walled(2, grid=Grid(SHAPE, 0.5))])
-    with pytest.raises(SettingError, match="to an environment, a World"):
+    with pytest.raises(SettingError, match="or a World"):
         Missions(in_given_worlds(free_box(), WORLDS))  # its worlds are not there any more
 
 

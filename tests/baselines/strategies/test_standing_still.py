@@ -17,7 +17,6 @@ from baselines.strategies import STRATEGIES, make_strategy
 from baselines.strategies.allocation import ExplorationConfig
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
-from baselines.suites.bundled_worlds import WORLDS
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.changes import with_settings
@@ -26,6 +25,7 @@ from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import CAVE, OFFICE
 from entropy_explore_env.worlds.load import load_world
 from entropy_explore_env.worlds.world import World
+from tests.public_worlds import needs_public_worlds
 
 
 class Maze(NamedTuple):
@@ -213,7 +213,8 @@ def test_robots_that_have_covered_all_go_on_where_the_mission_asks_for_more():
 
 def test_a_start_from_which_two_robots_once_stood_for_the_whole_mission():
     """0.7 m apart in a dungeon; with another rule one of them drove 0.2 m in 1,200 s."""
-    world = load_world(WORLDS / "dungeons" / "20.npz")
+    needs_public_worlds("dungeon-20")
+    world = load_world("dungeon-20")
     settings = {"robots": 2, "start_radius_m": 0.9, "ending": {"time_limit_s": 1200.0}}
     env = EntropyExploreEnv(with_settings(scripted(OFFICE), {**settings, "grid": world.grid}))
     run_mission(env, make_strategy("planned-rate"), 20, options={"world": world})

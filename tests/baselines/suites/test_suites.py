@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import hashlib
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from baselines.suites import SCOREBOARD, SUITES, bundled_worlds, find_suite, scoreboard
-from baselines.suites.bundled_worlds import WORLDS
+from baselines.experiments.rows import trial_key
+from baselines.experiments.trials import How
+from baselines.suites import SCOREBOARD, SUITES, find_suite, scoreboard
 from baselines.suites.page import about
+from baselines.suites.running import run_suite
 from entropy_explore_env import load_world
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.settings.scenarios import SCENARIOS
+from entropy_explore_env.worlds.files.process import kept_reader
+from entropy_explore_env.worlds.public import fetching
+from entropy_explore_env.worlds.public.fetching import FOLDER_VARIABLE
+from entropy_explore_env.worlds.public.table import PUBLIC
+from tests.public_worlds import needs_public_worlds
 
 TEAMS = ("random", "gradient")
 PINNED = {
@@ -46,13 +52,26 @@ def test_every_named_scenario_stands_in_a_suite():
 
 
 def test_the_worlds_are_those_that_they_were():
+    """Cells of all worlds of others in which rows were made, when their files lay in this repository."""
+    dungeons = [f"dungeon-{number}" for number in range(1, 101)]
+    names = sorted(["depot", "geb079", "warehouse", "willow", *dungeons])
+    needs_public_worlds(*names)
     digest = hashlib.sha256()
-    for path in sorted(WORLDS.rglob("*.npz")):
-        world = load_world(path)
-        digest.update(repr((path.relative_to(WORLDS).as_posix(), world.grid)).encode())
-        digest.update(np.packbits(world.occupied).tobytes())
-    digest.update((WORLDS / "starts.csv").read_bytes())
-    assert digest.hexdigest() == "51d9a6aa1c3dd334d6c5f6bbd321b90bb285c291445e1baeb6712078393672ac"
+    with kept_reader():
+        for name in names:
+            world = load_world(name)
+            assert world.grid == PUBLIC[name].grid
+            digest.update(repr((name, world.grid)).encode() + np.packbits(world.occupied).tobytes())
+    assert digest.hexdigest() == "cb8853ef41b7ac49eabc9c1e067e05ed843a6a2670088cae44dc3d01558d5f9d"
+
+
+def test_rows_hold_a_digest_of_every_world_whose_file_once_lay_here():
+    """Keys of rows are as they were, wherever the files of worlds lie now."""
+    trials = find_suite("plans", False, ("random",)).trials
+    worlds = {str(trial.settings["scenario"]["world"]) for trial in trials}
+    assert len(worlds) == 100 + 3 + 4
+    keys = "\n".join(trial_key(trial.cell, trial.seed, trial.settings) for trial in trials)
+    assert hashlib.sha256(keys.encode()).hexdigest()[:16] == "e21d79a253e93460"
 
 
 def test_plans_replan_at_every_scan_until_everything_is_seen():
@@ -93,20 +112,24 @@ def test_mission_k_of_every_task_comes_before_any_mission_k_plus_1():
 
 def test_dungeons_start_on_their_mark():
     (dungeons,) = [task for task in find_suite("plans", False, TEAMS).tasks if task.name == "dungeons"]
-    for place in dungeons.places[:: len(dungeons.places) // 4]:
+    assert len({place.scenario.world for place in dungeons.places}) == len(dungeons.places) == 100
+    some = dungeons.places[:: len(dungeons.places) // 4]
+    needs_public_worlds(*(place.scenario.world for place in some))
+    for place in some:
         world, start = load_world(place.scenario.world), place.start
         assert start is not None
         x, y, z = world.grid.voxel_of(np.asarray(start[:3]))
         assert not world.occupied[x, y, z]
-    assert len({place.scenario.world for place in dungeons.places}) == len(dungeons.places) == 100
 
 
-def test_unknown_suites_and_missing_worlds_are_named(monkeypatch):
+def test_unknown_suites_and_missing_worlds_are_named(monkeypatch, tmp_path):
     with pytest.raises(SettingError, match=r"suite = .plan.: expected one of plans, volumes, teams"):
         find_suite("plan", False, TEAMS)
-    monkeypatch.setattr(bundled_worlds, "WORLDS", Path("/nowhere"))
-    with pytest.raises(SettingError, match=r"suite world = '/nowhere/geb079.npz': expected a file that"):
-        find_suite("volumes", False, TEAMS)
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "worlds"))
+    monkeypatch.setattr(fetching, "HOST", "http://127.0.0.1:9")  # where nobody listens
+    with pytest.raises(WorldError, match=r"world = 'dungeon-1': expected img_1.png, which could not be"):
+        run_suite(find_suite("plans", True, TEAMS), tmp_path / "rows.jsonl", How())
+    assert not (tmp_path / "rows.jsonl").exists()
 
 
 @pytest.mark.parametrize("name", SUITES)
