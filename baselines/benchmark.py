@@ -30,7 +30,7 @@ from baselines.cli.worker_options import TrialOptions
 from baselines.experiments.rows import read_table
 from baselines.experiments.trials import How
 from baselines.strategies import STRATEGIES, make_strategy, resolved, shown_names
-from baselines.suites import find_suite, suite_strategies
+from baselines.suites import find_suite
 from baselines.suites.own import (
     DEFAULT_SCENARIOS,
     QUICK_SCENARIOS,
@@ -38,8 +38,7 @@ from baselines.suites.own import (
     scenario_tasks,
     world_tasks,
 )
-from baselines.suites.results import results_of
-from baselines.suites.running import run_suite
+from baselines.suites.results import results_of, run_suite
 from baselines.suites.suite import BASELINE, REFERENCE, Suite
 from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.settings.scenarios import SCENARIOS
@@ -210,15 +209,15 @@ def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
     given_all = given_values(Args, words)
     given = given_all.get("task", {})
     if args.suite is not None:
-        suite_strategies(args.suite)  # refuses an unknown suite first
+        suite = find_suite(args.suite, args.quick)
         pinned = {**given, **{name: given_all[name] for name in _PINNED if name in given_all}}
         for name, value in pinned.items():
             while isinstance(value, dict):
                 inner, value = next(iter(value.items()))
                 name = inner if name == "world_file" else f"{name}.{inner}"
             raise SettingError(name, value, "no value beside --suite, which pins it")
-        chosen = chosen_strategies(args.strategies, args.suite, alone=args.entry is not None)
-        return find_suite(args.suite, args.quick, chosen), []
+        chosen = chosen_strategies(args.strategies, suite, alone=args.entry is not None)
+        return dataclasses.replace(suite, strategies=chosen), []
     if args.world_scenario is not None and args.world_scenario not in SCENARIOS:
         raise SettingError("world_scenario", args.world_scenario, one_of(args.world_scenario, SCENARIOS))
     strategies = chosen_strategies(args.strategies)
@@ -235,25 +234,26 @@ def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
     return Suite("own", "Scenarios of one's own", tasks, strategies), refused
 
 
-def chosen_strategies(words: str | None, suite: str | None = None, alone: bool = False) -> tuple[str, ...]:
+def chosen_strategies(words: str | None, suite: Suite | None = None, alone: bool = False) -> tuple[str, ...]:
     """Return strategies from names with commas between them.
 
     Args:
         words: Names; `all` = every one; None = those of the suite's table, without a suite every one.
-        suite: Its name; the strategy that ratios are relative to is added, without a suite the random walk.
+        suite: The strategy that ratios are relative to is added, without a suite the random walk.
         alone: Add none.
 
     Raises:
-        SettingError: No strategy, or no suite, has such a name.
+        SettingError: No strategy has such a name.
     """
     if words is None and suite is not None:
-        names = list(suite_strategies(suite))
+        names = list(suite.strategies)
     else:
         names = list(STRATEGIES) if words in (None, "all") else words.split(",")
     for name in names:
         make_strategy(name)
-    added = [] if alone or suite == "faults" else [BASELINE if suite is None else REFERENCE]
-    return tuple(dict.fromkeys([*added, *map(resolved, names)]))
+    compared = suite is None or not (alone or suite.name == "faults")
+    reference = BASELINE if suite is None else REFERENCE
+    return tuple(dict.fromkeys([*([reference] if compared else []), *map(resolved, names)]))
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ from typing import Annotated
 from baselines import bag_replay
 from baselines.bag_replay import BagArgs, is_bag, replay_bag
 from baselines.cli.arguments import parse, run_command
-from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
+from baselines.cli.mission_outputs import MissionLog, Outputs, show_results
 from baselines.cli.options import Mark
 from baselines.cli.progress import progress_bar
 from baselines.experiments.mission import replay_commands
@@ -62,10 +62,8 @@ def main(words: Sequence[str]) -> int:
     record = load_record(args.record)
     if args.world_file is not None:
         record = replace(record, scenario=replace(record.scenario, world=args.world_file), world=None)
-    wanted = Wanted(args.output, args.out, recorded=False)
-    wanted.prepare()
-    title = f"{record.scenario.name}, replayed"
-    with MissionLog(wanted) as log, progress_bar(title, hidden=args.output.json) as show:
+    title, log = f"{record.scenario.name}, replayed", MissionLog(args.output, args.out, recorded=False)
+    with log, progress_bar(title, hidden=args.output.json) as show:
         env = _replayed(record, log, show)
         same = same_end(record, env.missions)
         replayed = {"same": same, "recorded_by": record.library, "replayed_by": VERSION}

@@ -22,7 +22,7 @@ from typing import Annotated, ClassVar
 
 from baselines.cli.arguments import parse, run_command
 from baselines.cli.interruption import Interruption
-from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted, show_results
+from baselines.cli.mission_outputs import MissionLog, Outputs, show_results
 from baselines.cli.options import Mark
 from baselines.cli.progress import progress_bar
 from baselines.cli.task_options import TaskOptions, base_task, parsed_for, tasked
@@ -78,10 +78,8 @@ def main(words: Sequence[str]) -> int:
     strategy = make_strategy(name)
     check_whole("seed", args.seed, 0)
     env = scripted_env(*tasked(task.scenario, args.task, args.robots), track_truth=True)
-    wanted = Wanted(args.output, args.out, args.record)
-    wanted.prepare()
-    title = f"{args.scenario}, {shown_name(name)}"
-    with MissionLog(wanted) as log, progress_bar(title, hidden=args.output.json) as show:
+    title, log = f"{args.scenario}, {shown_name(name)}", MissionLog(args.output, args.out, args.record)
+    with log, progress_bar(title, hidden=args.output.json) as show:
 
         def after_step(env: EntropyExploreEnv) -> None:
             log.note(env)

@@ -21,7 +21,7 @@ import numpy as np
 import torch
 from stable_baselines3.common.policies import ActorCriticPolicy
 
-from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted
+from baselines.cli.mission_outputs import MissionLog, Outputs
 from baselines.cli.task_options import TaskOptions, worlds_of
 from baselines.experiments.mission import Surroundings, run_mission, scripted
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
@@ -203,11 +203,9 @@ def draw_best_mission(run: Path, scenario: Scenario, surroundings: Surroundings)
     Returns:
         The files.
     """
-    wanted = Wanted(Outputs(json=True), run / "best-mission", recorded=False)
-    wanted.prepare()
     changes = {"split": "validation", "track_truth": True, "action": {"kind": "continuous"}}
     env = EntropyExploreEnv(with_settings(scripted(scenario), changes), **surroundings.settings())
-    with MissionLog(wanted) as log:
+    with MissionLog(Outputs(json=True), run / "best-mission", recorded=False) as log:
         run_mission(env, LearnedPolicy(run), validation_seeds(1)[0], log.note, log.command)
         _, files = log.finish(str(run))
     return files

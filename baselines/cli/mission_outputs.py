@@ -57,69 +57,58 @@ class Outputs:
     """Print one JSON object and nothing else."""
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """Which files a person asked for.
-
-    Attributes:
-        outputs: Those that each have an option.
-        out: Folder for mission.json, mission.png, mission.gif and the team's map, and for mission.npz where
-            it is `recorded`.
-        record: A mission record, an `.npz`.
-        recorded: Whether the folder gets a record, too; a replay has one already.
-    """
-
-    outputs: Outputs
-    out: Path | None = None
-    record: Path | None = None
-    recorded: bool = True
-
-    def prepare(self) -> None:
-        """Make the folders and find the packages, before anything is computed for nothing.
-
-        Raises:
-            SettingError: A file or folder cannot be made.
-            MissingExtraError: A package is not installed.
-        """
-        if self.outputs.truth and self.out is None:
-            raise SettingError("truth", True, "--out beside it")
-        mp4, rerun, bag = self.outputs.mp4, self.outputs.rerun, self.outputs.bag
-        needed = (
-            ("av", "av", mp4, "viewer"),
-            ("rerun-sdk", "rerun", rerun, "viewer"),
-            ("rosbags", "rosbags", bag, "ros"),
-        )
-        for package, module, file, extra in needed:
-            if file is not None and importlib.util.find_spec(module) is None:
-                raise MissingExtraError(package, extra)
-        if bag is not None and bag.exists():
-            raise SettingError("bag", str(bag), "a folder that does not exist yet")
-        if self.out is not None:
-            make_folder("out", self.out)
-        if bag is not None:
-            make_folder("bag", bag.parent)
-        files = {"gif": self.outputs.gif, "mp4": mp4, "record": self.record, "rerun": rerun}
-        for option, file in files.items():
-            if file is not None:
-                make_folder(option, file.parent)
-                if file.is_dir():
-                    raise SettingError(option, str(file), "a file, not a folder")
+def _prepare(outputs: Outputs, out: Path | None, record: Path | None) -> None:
+    """Make the folders and find the packages of what is asked for; see `MissionLog`."""
+    if outputs.truth and out is None:
+        raise SettingError("truth", True, "--out beside it")
+    mp4, rerun, bag = outputs.mp4, outputs.rerun, outputs.bag
+    needed = (
+        ("av", "av", mp4, "viewer"),
+        ("rerun-sdk", "rerun", rerun, "viewer"),
+        ("rosbags", "rosbags", bag, "ros"),
+    )
+    for package, module, file, extra in needed:
+        if file is not None and importlib.util.find_spec(module) is None:
+            raise MissingExtraError(package, extra)
+    if bag is not None and bag.exists():
+        raise SettingError("bag", str(bag), "a folder that does not exist yet")
+    if out is not None:
+        make_folder("out", out)
+    if bag is not None:
+        make_folder("bag", bag.parent)
+    files = {"gif": outputs.gif, "mp4": mp4, "record": record, "rerun": rerun}
+    for option, file in files.items():
+        if file is not None:
+            make_folder(option, file.parent)
+            if file.is_dir():
+                raise SettingError(option, str(file), "a file, not a folder")
 
 
 class MissionLog:
     """Follows the mission of an environment; used as a context, so that nothing unfinished is left."""
 
-    def __init__(self, wanted: Wanted) -> None:
-        """Take which files are wanted; `note` starts when the mission has been reset."""
-        self._wanted, self._began = wanted, time.perf_counter()
+    def __init__(
+        self, outputs: Outputs, out: Path | None = None, record: Path | None = None, recorded: bool = True
+    ) -> None:
+        """Make the folders and find the packages, before anything is computed for nothing.
+
+        Args:
+            outputs: Files that each have an option.
+            out: Folder for mission.json, mission.png, mission.gif and the team's map, and for mission.npz.
+            record: A mission record, an `.npz`.
+            recorded: Whether the folder gets a record, too; a replay has one already.
+
+        Raises:
+            SettingError: A file or folder cannot be made.
+            MissingExtraError: A package is not installed.
+        """
+        _prepare(outputs, out, record)
+        self._outputs, self._out, self._began = outputs, out, time.perf_counter()
+        kept = out / "mission.npz" if out is not None and recorded else None
+        self._records = [file for file in (kept, record) if file is not None]
         self._painter = Painter("rgb_array")
-        self._gifs = [
-            file for file in (wanted.out and wanted.out / "mission.gif", wanted.outputs.gif) if file
-        ]
-        films = {
-            "gif": _GIF_PICTURES if self._gifs else 0,
-            "mp4": _VIDEO_PICTURES if wanted.outputs.mp4 else 0,
-        }
+        self._gifs = [file for file in (out and out / "mission.gif", outputs.gif) if file]
+        films = {"gif": _GIF_PICTURES if self._gifs else 0, "mp4": _VIDEO_PICTURES if outputs.mp4 else 0}
         self._films = {kind: Film(most) for kind, most in films.items() if most}
         self._followers: list[RerunView | BagWriter] = []
         self._stack = ExitStack()
@@ -135,8 +124,7 @@ class MissionLog:
 
     def _start(self, env: EntropyExploreEnv) -> None:
         self.recorder, self.commands = Recorder(env.missions), CommandRecorder(env.missions)
-        outputs = self._wanted.outputs
-        for kind, path in ((RerunView, outputs.rerun), (BagWriter, outputs.bag)):
+        for kind, path in ((RerunView, self._outputs.rerun), (BagWriter, self._outputs.bag)):
             if path is not None:
                 self._followers.append(self._stack.enter_context(kind(env.missions, path)))
         self._started = True
@@ -184,20 +172,18 @@ class MissionLog:
         return figures, self._write(figures)
 
     def _write(self, figures: dict[str, Any]) -> list[Path]:
-        wanted, written = self._wanted, []
-        if wanted.out is not None:
-            written += self._write_folder(wanted.out, figures)
+        outputs, written = self._outputs, []
+        if self._out is not None:
+            written += self._write_folder(self._out, figures)
         for file in self._gifs:
             animate(self._films["gif"].pictures(_GIF_LAST), file, _GIF_FRAME_S)
             written.append(file)
-        if wanted.outputs.mp4 is not None:
-            write_video(self._films["mp4"].pictures(_VIDEO_LAST), wanted.outputs.mp4, _VIDEO_FRAMES_PER_S)
-            written.append(wanted.outputs.mp4)
-        kept = wanted.out / "mission.npz" if wanted.out is not None and wanted.recorded else None
-        for file in (kept, wanted.record):
-            if file is not None:
-                save_record(self.commands.record(figures["strategy"], self._results()), file)
-                written.append(file)
+        if outputs.mp4 is not None:
+            write_video(self._films["mp4"].pictures(_VIDEO_LAST), outputs.mp4, _VIDEO_FRAMES_PER_S)
+            written.append(outputs.mp4)
+        for file in self._records:
+            save_record(self.commands.record(figures["strategy"], self._results()), file)
+            written.append(file)
         for follower in self._followers:
             follower.finish()
             written.append(follower.path)
@@ -232,7 +218,7 @@ class MissionLog:
         write_atomically(folder / "mission.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
         strategy = shown_name(figures["strategy"])
         end = self._painter.frame(recorder.missions)
-        picture = mission_picture(recorder, end, named(figures), strategy, self._wanted.outputs.truth)
+        picture = mission_picture(recorder, end, named(figures), strategy, self._outputs.truth)
         write_atomically(folder / "mission.png", picture)
         name = "map.yaml" if self._team_map.grid.flat else "map.npz"
         maps = save_map(self._team_map, folder / name)

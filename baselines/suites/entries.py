@@ -24,8 +24,7 @@ from baselines.experiments.trials import Cell, CellTrial, How, described_scenari
 from baselines.experiments.worker_pool import Failure, run_each
 from baselines.suites import find_suite
 from baselines.suites.public_worlds import fetch_worlds
-from baselines.suites.results import by_seed
-from baselines.suites.running import run_suite
+from baselines.suites.results import by_seed, run_suite
 from baselines.suites.suite import Suite
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import EntropyExploreError, SettingError

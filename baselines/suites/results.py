@@ -1,4 +1,4 @@
-"""From missions of a suite to rows: one of each strategy in each task, and one over all tasks.
+"""From a suite to its missions, and to rows: one of each strategy in each task, and one over all tasks.
 
 A measure (path, time) of a mission that never came that far counts with its limit. A ratio is that of paired
 missions, with the same world, start and seed: of a task its geometric mean, over all tasks the geometric mean
@@ -7,8 +7,10 @@ of the tasks', each task alike.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import time
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,8 @@ import numpy as np
 from baselines.experiments import rows as kept_rows
 from baselines.experiments.rows import Record
 from baselines.experiments.statistics import Interval, geometric_ratio_interval, median_interval
-from baselines.experiments.trials import Cell, CellTrial
+from baselines.experiments.trials import Cell, CellTrial, How, run_trials
+from baselines.suites.public_worlds import fetch_worlds
 from baselines.suites.suite import BASELINE, REFERENCE, Measure, Records, Suite, Task
 from entropy_explore_env.errors import MissingExtraError, SettingError
 
@@ -127,6 +130,40 @@ class Results:
         """Return numbers of the missions of a task that all of some strategies ran."""
         first, *others = (self.numbered(task, strategy) for strategy in strategies)
         return [number for number in first if all(number in other for other in others)]
+
+
+def run_suite(
+    suite: Suite,
+    table: Path,
+    how: How,
+    known: Sequence[kept_rows.Row] = (),
+    trial_of: Callable[[Cell, int], CellTrial] = CellTrial,
+) -> list[kept_rows.Row | None]:
+    """Run what is missing of a suite; see `run_trials`.
+
+    Args:
+        suite: Without its later tasks.
+        table: The file of rows.
+        how: Where and how long.
+        known: Rows from elsewhere.
+        trial_of: Makes a trial of a cell and a seed.
+
+    Returns:
+        The row of each mission; None where the time was up.
+
+    Raises:
+        WorldError: A public world cannot be fetched: no mission is run.
+    """
+    began_s = time.monotonic()
+    fetch_worlds(cell.scenario for cell in suite.cells)
+    found = run_trials([trial_of(trial.point, trial.seed) for trial in suite.trials], table, how, known)
+    if suite.later is None:
+        return found
+    first = {cell.id for cell in suite.cells}
+    completed = suite.completed(by_seed(row for row in found if row is not None))
+    later = [trial_of(each.point, each.seed) for each in completed.trials if each.cell not in first]
+    left_s = max(how.stop_after_s - (time.monotonic() - began_s), 0.0)
+    return found + run_trials(later, table, replace(how, stop_after_s=left_s), known)
 
 
 def results_of(suite: Suite, rows: Sequence[kept_rows.Row]) -> tuple[Results, list[kept_rows.Row]]:

@@ -7,7 +7,7 @@ import octomap
 import pytest
 import trimesh
 
-from baselines.cli.mission_outputs import MissionLog, Outputs, Wanted
+from baselines.cli.mission_outputs import MissionLog, Outputs
 from entropy_explore_env.belief.belief_map import Map
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import CallOrderError, SettingError, WorldError
@@ -143,7 +143,7 @@ def test_infos_say_the_share_seen_where_the_mission_ends_by_it():
 def test_the_folder_of_a_mission_holds_the_map_of_its_team(tmp_path, scenario, name):
     env = EntropyExploreEnv(scenario, robots=1)
     env.reset(seed=0)
-    with MissionLog(Wanted(Outputs(), tmp_path)) as log:
+    with MissionLog(Outputs(), tmp_path) as log:
         log.note(env)
         for _ in range(20):
             env.step({agent: env.action_space(agent).sample() for agent in env.agents})

@@ -13,7 +13,7 @@ from baselines.cli.arguments import run_command
 from baselines.experiments.rows import read_table, write_table
 from baselines.suites.entries import ROWS, check_entry, record_file
 from baselines.suites.page import entries_table
-from baselines.suites.suite import task_in
+from baselines.suites.suite import Suite, task_in
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports.mission_record import load_record, save_record
 from entropy_explore_env.settings.scenarios import BOX
@@ -22,20 +22,21 @@ CELL = "box/gradient"
 WORDS = ("--suite", "tiny", "--strategies", "gradient", "--author", "A. Name", "--jobs", "1")
 
 
-def tiny_tasks(quick):
-    return (task_in("box", BOX, 1 if quick else 3, ending={"time_limit_s": 8.0}),)
+def tiny_suite(quick):
+    task = task_in("box", BOX, 1 if quick else 3, ending={"time_limit_s": 8.0})
+    return Suite("tiny", "Tiny", (task,), ("random",))
 
 
 @pytest.fixture(autouse=True)
 def tiny(monkeypatch):
-    monkeypatch.setitem(suites.SUITES, "tiny", suites.Pinned("Tiny", tiny_tasks, ("random",)))
+    monkeypatch.setitem(suites.SUITES, "tiny", tiny_suite)
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("entries") / "mine"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(suites.SUITES, "tiny", suites.Pinned("Tiny", tiny_tasks, ("random",)))
+        patch.setitem(suites.SUITES, "tiny", tiny_suite)
         stopped = [*WORDS, "--entry", str(folder), "--stop-after-s", "0"]
         assert run_command(benchmark.main, stopped) == 0 and not (folder / ROWS).exists()
         assert run_command(benchmark.main, stopped[:-2]) == 0

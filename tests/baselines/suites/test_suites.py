@@ -11,7 +11,7 @@ from baselines.experiments.rows import trial_key
 from baselines.experiments.trials import How
 from baselines.suites import SCOREBOARD, SUITES, find_suite, scoreboard
 from baselines.suites.page import about
-from baselines.suites.running import run_suite
+from baselines.suites.results import run_suite
 from entropy_explore_env import load_world
 from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.settings.scenarios import SCENARIOS
