@@ -7,18 +7,15 @@ which a voxel's differential entropy exceeds that of a voxel that counts as know
 
     H(C_l) = max(h(σ_l) - h(σ_known), 0) = max(½ log2(p_known / p_l), 0).
 
-With an `Occlusion`, voxels behind something believed covered are not visible. The paper's cone ignores
-obstacles: `occlusion` = None.
+As in the paper, obstacles hide nothing.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.raycast import ONE_BEHIND, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
 from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 
@@ -31,17 +28,6 @@ CONE = record_type(
     ],
 )
 """What a robot sees, or will see, from a viewpoint."""
-
-
-class Occlusion(NamedTuple):
-    """What hides voxels, and scratch space for the rays that find out."""
-
-    mean: np.ndarray
-    """(V,) float32 expected coverage."""
-    crossed: np.ndarray
-    """(L,) int32, see `cast_ray`."""
-    entered: np.ndarray
-    """(L,) int64."""
 
 
 _FOLD_ABOVE = 1e250
@@ -111,33 +97,10 @@ def _column_span(cone, dx, dy, layers):
 
 
 @inlined_kernel
-def _unobstructed(cone, size, i, j, k, occlusion):
-    """Whether nothing believed covered stands between the apex and the centre of a voxel."""
-    if occlusion is None:
-        return True
-    mean, crossed, entered = occlusion.mean, occlusion.crossed, occlusion.entered
-    x, y, z = i + 0.5 - cone.apex[0], j + 0.5 - cone.apex[1], k + 0.5 - cone.apex[2]
-    length = math.sqrt(x * x + y * y + z * z)
-    if length <= 1.0:
-        return True
-    start, direction = (cone.apex[0], cone.apex[1], cone.apex[2]), (x / length, y / length, z / length)
-    _, n, _ = cast_ray(
-        mean,
-        size,
-        Line(start, direction, length),
-        STOP_AT_COVERED,
-        OPEN_END,
-        ONE_BEHIND,
-        Crossing(crossed, entered),
-    )
-    return crossed[n - 1] == flat_index(size, i, j, k)
-
-
-@inlined_kernel
-def _visible(cone, size, i, j, k, occlusion):
+def _visible(cone, i, j, k):
     """Whether a voxel of a column's span is visible."""
     dx, dy, dz = i + 0.5 - cone.apex[0], j + 0.5 - cone.apex[1], k + 0.5 - cone.apex[2]
-    return (cone.cosine >= 0.0 or in_cone(cone, dx, dy, dz)) and _unobstructed(cone, size, i, j, k, occlusion)
+    return cone.cosine >= 0.0 or in_cone(cone, dx, dy, dz)
 
 
 @inlined_kernel
@@ -156,32 +119,26 @@ def _span(cone, axis, size):
 
 
 @lean_kernel
-def mark_cone(cone, size, occlusion, marks, mark):
-    """Give the voxels that are visible in a cone a mark (RochaMI, eqs. 5 and 8).
+def mark_cones(cones, size, marks, mark):
+    """Give the voxels that are visible in any of (M,) CONE a mark (RochaMI, eqs. 5 and 8).
 
     Args:
         marks: (V,) uint8.
         mark: What the visible ones become, 0 … 255.
     """
-    first_x, last_x = _span(cone, 0, size[0])
-    first_y, last_y = _span(cone, 1, size[1])
-    for i in range(first_x, last_x):
-        for j in range(first_y, last_y):
-            first, last = _column_span(cone, i + 0.5 - cone.apex[0], j + 0.5 - cone.apex[1], size[2])
-            for k in range(first, last):
-                if _visible(cone, size, i, j, k, occlusion):
-                    marks[np.uint32(flat_index(size, i, j, k))] = mark
-
-
-@lean_kernel
-def mark_cones(cones, size, marks, mark):
-    """Give the voxels whose centres lie in any of (M,) CONE a mark, whatever hides them; see `mark_cone`."""
     for cone in cones:
-        mark_cone(cone, size, None, marks, mark)
+        first_x, last_x = _span(cone, 0, size[0])
+        first_y, last_y = _span(cone, 1, size[1])
+        for i in range(first_x, last_x):
+            for j in range(first_y, last_y):
+                first, last = _column_span(cone, i + 0.5 - cone.apex[0], j + 0.5 - cone.apex[1], size[2])
+                for k in range(first, last):
+                    if _visible(cone, i, j, k):
+                        marks[np.uint32(flat_index(size, i, j, k))] = mark
 
 
 @lean_kernel
-def visible_bits(cone, size, precision, known_precision, occlusion, marks):
+def visible_bits(cone, size, precision, known_precision, marks):
     """Entropy that a cone covers, and how much of it marked voxels cover, too (RochaMI, eqs. 7 and 10).
 
     Args:
@@ -198,7 +155,7 @@ def visible_bits(cone, size, precision, known_precision, occlusion, marks):
         for j in range(first_y, last_y):
             first, last = _column_span(cone, i + 0.5 - cone.apex[0], j + 0.5 - cone.apex[1], size[2])
             for k in range(first, last):
-                if _visible(cone, size, i, j, k, occlusion):
+                if _visible(cone, i, j, k):
                     voxel = np.uint32(flat_index(size, i, j, k))
                     ratio = max(known_precision / precision[voxel], 1.0)
                     if marks[voxel] > 0:

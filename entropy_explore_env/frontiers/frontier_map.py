@@ -22,7 +22,6 @@ from entropy_explore_env.settings.validation import check, check_choice, check_p
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
 
 Visibility = Literal["ray-cast", "naive"]
-UnexploredGround = Literal["falling", "level"]
 KNOWN_SIGMA = 0.5
 """σ from which on a voxel is known: a single measurement of our sensors brings it far below."""
 _BATCH = 4
@@ -40,8 +39,6 @@ class FrontierConfig:
         spacing_m: Distance between candidates, at least a voxel; None = a sixth of the range.
         visibility: `ray-cast`, or the `naive` count of all unexplored points in a ball.
         gamma: γ of the height factor: relative height against absolute height. None = no height factor.
-        unexplored_ground: Of terrain, as it is assumed: `falling` from z_av at the candidate to the
-            workspace's floor where the range ends (sect. 3.4), or `level` at z_av.
 
     Raises:
         SettingError: A field has another value.
@@ -50,14 +47,12 @@ class FrontierConfig:
     spacing_m: float | None = None
     visibility: Visibility = "ray-cast"
     gamma: float | None = 0.5
-    unexplored_ground: UnexploredGround = "falling"
 
     def __post_init__(self) -> None:
         """Check every field."""
         if self.spacing_m is not None:
             check_positive(self, "spacing_m")
         check_choice(self, "visibility")
-        check_choice(self, "unexplored_ground")
         if self.gamma is not None:
             check(self, "gamma", "None, or a number from 0 to 1", lambda v: 0.0 <= v <= 1.0)
 

@@ -244,7 +244,6 @@ class TerrainFrontiers(FrontierMap):
             gamma=-1.0 if frontiers.gamma is None else frontiers.gamma,
             unit=edge,
             highest=TOO_HIGH * self.reach,
-            fade=self.reach if frontiers.unexplored_ground == "falling" else math.inf,
         )
         self.point, self._sight = edge**2, (self.reach + 1.5 * self._model.patch + 2.0, 0.0)
         factor = 1.0 if frontiers.gamma is None else edge * high

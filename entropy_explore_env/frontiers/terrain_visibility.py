@@ -37,8 +37,6 @@ class ViewModel(NamedTuple):
     """Metres a layer, in the height factor."""
     highest: float
     """The greatest z_f - z_av of a candidate."""
-    fade: float
-    """Distance at which unexplored ground is assumed to reach the floor; inf = it is level."""
 
 
 @lean_kernel
@@ -54,12 +52,12 @@ def mean_ground(terrain, x, y, patch):
 
 
 @inlined_kernel
-def height_at(terrain, x, y, eye, average, fade):
-    """Height of a column: its ground if mapped, else extrapolated (sect. 3.4), 0 from `fade` columns on."""
+def height_at(terrain, x, y, eye, average, reach):
+    """Height of a column: its ground if mapped, else extrapolated (sect. 3.4), 0 out of reach."""
     if terrain.ground[x, y] != NONE:
         return np.float64(terrain.ground[x, y])
     dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]
-    return max((1.0 - math.sqrt(dx * dx + dy * dy) / fade) * average, 0.0)
+    return max((1.0 - math.sqrt(dx * dx + dy * dy) / reach) * average, 0.0)
 
 
 @lean_kernel
@@ -77,7 +75,7 @@ def count_below(counter, terrain, eye, average, azimuths, model, marking):
         enters, horizon = 0.0, -math.inf
         while enters <= reach:
             leaves = min(face_x, face_y)
-            drop = eye[2] - height_at(terrain, x, y, eye, average, model.fade)
+            drop = eye[2] - height_at(terrain, x, y, eye, average, reach)
             if drop <= 0.0:
                 break  # it hides the tops of all lower columns behind it
             slope = -drop / leaves
@@ -107,7 +105,7 @@ def count_columns_in_ball(counter, terrain, eye, average, model, marking):
         for y in range(max(int(eye[1] - reach - 0.5), 0), min(int(eye[1] + reach + 1.0), size[1])):
             column = x * size[1] + y
             dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]
-            dz = eye[2] - height_at(terrain, x, y, eye, average, model.fade)
+            dz = eye[2] - height_at(terrain, x, y, eye, average, reach)
             near = dx * dx + dy * dy + dz * dz <= reach * reach
             if near and terrain.columns.state[column] & UNEXPLORED:
                 points += 1

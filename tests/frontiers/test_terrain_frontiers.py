@@ -74,9 +74,9 @@ def test_ground_is_the_known_covered_voxel_below_a_known_free_one(seed):
     np.testing.assert_array_equal(terrain.ground, reference.ground_of(state))
 
 
-@given(seeds, st.floats(0.5, 7.5), st.floats(3.0, 12.0), st.sampled_from([0.0, 0.3]), st.booleans())
+@given(seeds, st.floats(0.5, 7.5), st.floats(3.0, 12.0), st.sampled_from([0.0, 0.3]))
 @drawn(60)
-def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, min_tangent, level):
+def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, min_tangent):
     ground, rng = hills(seed)
     x, y = int(rng.integers(0, 9)), int(rng.integers(0, 13))
     ground[x, y] = 0 if ground[x, y] == NONE else min(ground[x, y], int(height))
@@ -85,12 +85,11 @@ def test_columns_are_those_whose_tops_rays_meet(seed, height, reach, min_tangent
     azimuths = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     average = mean_ground(terrain, x, y, 2)
     assert average == pytest.approx(reference.mean_height(terrain.ground, x, y, 2))
-    fade = math.inf if level else reach
-    heights = reference.surface(terrain.ground, eye, average, fade)
+    heights = reference.surface(terrain.ground, eye, average, reach)
     unexplored = terrain.ground == NONE
     wanted = reference.seen_columns(heights, unexplored, eye, azimuths, reach, min_tangent)
     counter = new_counter(9 * 13, SHAPE)
-    view_model = ViewModel(reach, min_tangent, 2, 0.5, 1.0, math.inf, fade)
+    view_model = ViewModel(reach, min_tangent, 2, 0.5, 1.0, math.inf)
     points, value = count_below(counter, terrain, eye, average, azimuths, view_model, True)
     marked = {tuple(map(int, np.unravel_index(c, (9, 13)))) for c in np.flatnonzero(counter.promised)}
     assert (points, value, marked) == (len(wanted), len(wanted), wanted)
@@ -108,7 +107,7 @@ def test_a_ridge_hides_the_valley_behind_it_by_hand():
     ground = np.ones((9, 3), np.int32)
     ground[4], ground[6:] = 4, NONE
     east = np.array([[1.0, 0.0]])
-    counter, view_model = new_counter(27, (9, 3, 8)), ViewModel(10.0, 0.0, 2, 0.5, 1.0, math.inf, fade=10.0)
+    counter, view_model = new_counter(27, (9, 3, 8)), ViewModel(10.0, 0.0, 2, 0.5, 1.0, math.inf)
     terrain = known_ground(ground, (9, 3, 8))
     for height, wanted in ((3.5, 0), (5.5, 1), (7.5, 2)):
         # z_av = 1: extrapolated 1 - d/10. From 5.5 over the ridge's far edge at d = 4.5: slope -1/3, which
@@ -169,7 +168,7 @@ def test_the_height_factor_by_hand():
     ground[7:] = NONE
     terrain = known_ground(ground)
     voxels = np.array([(4 * 13 + 5) * 8 + z for z in (3, 6)], np.int32)  # z_f = 3.5 and 6.5, z_av = 2
-    view_model = ViewModel(10.0, 0.0, patch=1, gamma=0.5, unit=2.0, highest=9.0, fade=10.0)
+    view_model = ViewModel(10.0, 0.0, patch=1, gamma=0.5, unit=2.0, highest=9.0)
     factors = np.empty(2)
     for changed, wanted in (  # a layer is 2 m high
         ({}, [2.0 * math.sqrt(1.5 * 3.5), 2.0 * math.sqrt(4.5 * 6.5)]),

@@ -35,24 +35,9 @@ def inside(cone: Cone, voxel: Voxel) -> bool:
     return math.acos(max(-1.0, min(1.0, cosine))) <= cone.half_angle
 
 
-def in_sight(cone: Cone, voxel: Voxel, beliefs: dict[Voxel, Belief], size: Voxel) -> bool:
-    """Whether the line from the apex meets nothing covered before the voxel (not the one it starts in)."""
-    way = [index + 0.5 - at for index, at in zip(voxel, cone.apex, strict=True)]
-    length = math.hypot(*way)
-    if length <= 1.0:
-        return True
-    pieces = rocha04.pieces_of(cone.apex, [w / length for w in way], size)
-    between = [piece.voxel for piece in pieces[1:] if piece.entered < length and piece.voxel != voxel]
-    return all(beliefs[crossed][0] <= 0.5 for crossed in between)
-
-
-def visible(cone: Cone, beliefs: dict[Voxel, Belief], size: Voxel, occluded: bool = False) -> set[Voxel]:
-    """Zⁱ (eq. 5), with or without what stands in the way."""
-    return {
-        voxel
-        for voxel in beliefs
-        if inside(cone, voxel) and (not occluded or in_sight(cone, voxel, beliefs, size))
-    }
+def visible(cone: Cone, beliefs: dict[Voxel, Belief]) -> set[Voxel]:
+    """Zⁱ (eq. 5); obstacles hide nothing."""
+    return {voxel for voxel in beliefs if inside(cone, voxel)}
 
 
 def voxel_bits(sigma: float, sigma_known: float) -> float:
@@ -142,7 +127,7 @@ def values(
             if math.hypot(*slope) > 0.0:
                 slopes[voxel] = (place, slope)
     steepest = max((math.hypot(*slope) for _, slope in slopes.values()), default=1.0)
-    covered = set().union(*(visible(mate.cone, beliefs, size) for mate in mates if mate.cone))
+    covered = set().union(*(visible(mate.cone, beliefs) for mate in mates if mate.cone))
     found = {}
     for voxel, (place, slope) in slopes.items():
         steepness, length = math.hypot(*slope), math.dist(place, position)
@@ -164,7 +149,7 @@ def values(
             )
             if way <= cone[0] and (way == 0.0 or math.acos(max(-1.0, min(1.0, ahead / way))) <= cone[1]):
                 worth *= weights.interference
-        shared = covered_bits(visible(view, beliefs, size) & covered, beliefs, weights.sigma_known)
+        shared = covered_bits(visible(view, beliefs) & covered, beliefs, weights.sigma_known)
         worth *= math.exp(-shared / weights.scale_bits)
         if worth > 0.0:
             found[voxel] = worth - weights.kappa * length / radius

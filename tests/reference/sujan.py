@@ -23,17 +23,8 @@ def voxels_in_view(mean, start, yaw, pitch, yaws, pitches, reach):
     return seen
 
 
-def stretched(p, distance_m):
-    """Eq. 7, within [0, 1], from a metre on."""
-    if p < 0.5:
-        out = (1.0 / (1.0 - p) / max(distance_m, 1.0) - 1.0) / 2.0
-    else:
-        out = 1.0 - (1.0 / p / max(distance_m, 1.0) - 1.0) / 2.0
-    return min(max(out, 0.0), 1.0)
-
-
-def new_information(occupancies, interests, most, weighed):
-    """Eq. 8, or eq. 6 with the sign that its second sum has lost, of the occupancies in view of one kind."""
+def new_information(occupancies, interests, most):
+    """Eq. 8, of the occupancies in view of one kind."""
     bits = 0.0
     for level in range(LEVELS):
         n = sum(
@@ -43,7 +34,7 @@ def new_information(occupancies, interests, most, weighed):
         )
         q, p_k = min(n / most, 1.0), (level + 0.5) / LEVELS
         if q > 0.0:
-            uncertainty = -(p_k * math.log2(p_k) + (1.0 - p_k) * math.log2(1.0 - p_k)) if weighed else 1.0
+            uncertainty = -(p_k * math.log2(p_k) + (1.0 - p_k) * math.log2(1.0 - p_k))
             bits -= uncertainty * q * math.log2(q)
     return bits
 

@@ -9,9 +9,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.strategies.mutual_information.candidates import MATE, Body, Factors, Team, best_candidate
+from baselines.strategies.mutual_information.candidates import (
+    INTERFERENCE,
+    MATE,
+    Body,
+    Factors,
+    Team,
+    best_candidate,
+)
 from entropy_explore_env.belief.fields import Belief
-from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cone
+from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cones
 from entropy_explore_env.viewpoints.gradient_candidates import gradient_candidates
 from tests.reference import rochami
 from tests.reference.scenes import as_reference, drawn, random_belief, ray_space, seeds
@@ -34,10 +41,12 @@ def ours(belief, position, radius, cone, mates, weights, planar, ranked=None):
         heard[place]["touching"] = weights.touching
         if mate.cone is not None:
             c = mate.cone
-            mark_cone(_cone(c.apex, c.yaw, c.pitch, c.radius, c.half_angle), SIZE, None, marks, 1)
+            cone_of_mate = _cone(c.apex, c.yaw, c.pitch, c.radius, c.half_angle)
+            mark_cones(np.array([cone_of_mate], CONE), SIZE, marks, 1)
     if len(candidates) == 0:
         return candidates, -1
-    factors = Factors(weights.kappa, weights.scale_bits, weights.interference, True, known)
+    assert weights.interference == INTERFERENCE or not mates
+    factors = Factors(weights.kappa, weights.scale_bits, known)
     most = candidates["steepness"] / candidates["steepness"].max()
     most = most - weights.kappa * candidates["distance"] / radius
     order = np.argsort(-most, kind="stable") if ranked is None else ranked(most)
@@ -49,7 +58,6 @@ def ours(belief, position, radius, cone, mates, weights, planar, ranked=None):
         Body(tuple(map(float, position)), radius, 0.0, OUR_BALL, ray_space(SIZE, behind=1)),
         Team(heard, marks),
         own,
-        None,
         factors,
     )
     return candidates, best
@@ -119,7 +127,7 @@ def test_an_overlap_with_unknown_space_repels_and_one_with_known_space_does_not(
     precision[:, 9:] = precision[:, :2] = 1e-2
     sees = rochami.Cone((3.5, 5.5, 2.5), math.pi / 2, 0.0, 6.0, 0.8)
     far = (-50.0, -50.0, 2.5)
-    weights = rochami.Weights(0.0, 5.0, 1.0, 0.05, 0.0)
+    weights = rochami.Weights(0.0, 5.0, INTERFERENCE, 0.05, 0.0)
     for yaw, side in ((math.pi / 2, 1), (-math.pi / 2, 9)):
         mate = rochami.Mate(far, far, sees._replace(yaw=yaw))
         candidates, best = ours(

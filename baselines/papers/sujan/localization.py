@@ -20,7 +20,7 @@ from baselines.experiments.statistics import mean_interval, ratio_interval
 from baselines.experiments.tables import cells_table
 from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.papers.sujan.planar import METHODS, at_end, in_the_middle, scenario_of
-from baselines.strategies.rules.next_best_view import NextBestView, NextBestViewConfig
+from baselines.strategies.rules.next_best_view import NextBestView
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.settings.changes import with_settings
@@ -65,7 +65,7 @@ class Run:
     have nothing of the kind.
     """
 
-    config: NextBestViewConfig
+    error_weight: float = 0.0
 
     def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
         """Run the mission.
@@ -94,7 +94,7 @@ class Run:
             for name, number in found.items():
                 series[name].append(round(float(number), 4))
 
-        run_mission(env, NextBestView(self.config), seed, note, backs_off=False)
+        run_mission(env, NextBestView(self.error_weight), seed, note, backs_off=False)
         return {**mission_figures(env.missions, 0, floor=False), **series}
 
 
@@ -116,16 +116,15 @@ def experiment(amount: Amount) -> list[CellTrial]:
     for reach in REACH_M:
         cells += [_cell(count, reach, 0.0, worlds, scans) for count in COUNTS if count]
     own = with_settings(drifting(0, "far", scans), {"fiducials": {"own_number": OWN}})
-    cells.append(Cell(OWN_ID, own, METHODS["v"], worlds, Run(NextBestViewConfig()), in_the_middle(1)))
+    cells.append(Cell(OWN_ID, own, METHODS["v"], worlds, Run(), in_the_middle(1)))
     for count in SPARSE:
         cells += [_cell(count, "far", weight, worlds, scans) for weight in ERROR_WEIGHTS]
     return trials_of(cells)
 
 
 def _cell(count: int, reach: str, weight: float, worlds: int, scans: int) -> Cell:
-    run = Run(NextBestViewConfig(error_weight=weight))
     task = drifting(count, reach, scans)
-    return Cell(cell_id(count, reach, weight), task, METHODS["v"], worlds, run, in_the_middle(1))
+    return Cell(cell_id(count, reach, weight), task, METHODS["v"], worlds, Run(weight), in_the_middle(1))
 
 
 def drifting(count: int, reach: str, scans: int) -> Scenario:

@@ -24,6 +24,8 @@ from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 from entropy_explore_env.robots.motion import distance_to_teammate, line_believed_blocked
 
+INTERFERENCE = 0.5
+"""η, for each teammate in the candidate's cone."""
 MATE = record_type([("begin", "f8", (3,)), ("end", "f8", (3,)), ("touching", "f8")])
 """Where a teammate was heard to be, and to drive to, in grid units; `touching`: sum of the two radii."""
 
@@ -34,11 +36,7 @@ class Factors(NamedTuple):
     distance_cost: float
     """κ."""
     scale_bits: float
-    """ξ of eq. 12; inf = λ is 1."""
-    interference: float
-    """η for each teammate in view."""
-    static_reach: bool
-    """Whether ρ depends on what is believed covered."""
+    """ξ of eq. 12."""
     known_precision: float
     """1/σ² of a voxel that counts as known."""
 
@@ -121,7 +119,7 @@ def _teammate_on_line(mates, begin, end, length):
 
 
 @lean_kernel
-def best_candidate(candidates, order, belief, body, team, cone, occlusion, factors):
+def best_candidate(candidates, order, belief, body, team, cone, factors):
     """Return the candidate with the greatest value of eq. 13, of those whose gain is above 0.
 
     Candidates come in the order of their values for λ = ρ = η = 1: the first one whose bound is not above the
@@ -134,7 +132,6 @@ def best_candidate(candidates, order, belief, body, team, cone, occlusion, facto
         body: A Body.
         team: A Team.
         cone: A CONE with r̂ and α̂; its apex and gaze are overwritten.
-        occlusion: An Occlusion, or None; see belief/visibility.py.
         factors: Factors.
 
     Returns:
@@ -150,8 +147,7 @@ def best_candidate(candidates, order, belief, body, team, cone, occlusion, facto
         if gain - cost <= best:
             break
         end = (candidate.place[0], candidate.place[1], candidate.place[2])
-        if factors.static_reach:
-            gain *= reachability(belief, body, end)
+        gain *= reachability(belief, body, end)
         if gain <= 0.0 or gain - cost <= best:
             continue
         if len(team.mates) > 0:
@@ -161,13 +157,12 @@ def best_candidate(candidates, order, belief, body, team, cone, occlusion, facto
             for mate in team.mates:
                 to = mate.end[0] - cone.apex[0], mate.end[1] - cone.apex[1], mate.end[2] - cone.apex[2]
                 if in_cone(cone, to[0], to[1], to[2]):
-                    gain *= factors.interference
+                    gain *= INTERFERENCE
             if gain - cost <= best:
                 continue
-            if not math.isinf(factors.scale_bits):
-                known = factors.known_precision
-                _, shared = visible_bits(cone, belief.size, belief.precision, known, occlusion, team.marks)
-                gain *= math.exp(-shared / factors.scale_bits)
+            known = factors.known_precision
+            _, shared = visible_bits(cone, belief.size, belief.precision, known, team.marks)
+            gain *= math.exp(-shared / factors.scale_bits)
         if gain - cost > best and gain > 0.0:
             best, found = gain - cost, number
     return found

@@ -10,14 +10,16 @@ import numpy as np
 from baselines.strategies.mutual_information.candidates import MATE, Body, Factors, Team, best_candidate
 from entropy_explore_env.belief.paths.lattice import new_lattice
 from entropy_explore_env.belief.raycast import Crossing, longest_crossing
-from entropy_explore_env.belief.visibility import CONE, Occlusion, mark_cone
+from entropy_explore_env.belief.visibility import CONE, mark_cones
 from entropy_explore_env.frontiers.knowledge import announced_cone, belief_of
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.ending import gaussian_entropy_bits
 from entropy_explore_env.settings.scenario import Scenario
-from entropy_explore_env.settings.validation import check, check_kind, check_not_negative, check_positive
+from entropy_explore_env.settings.validation import check_kind, check_not_negative
 from entropy_explore_env.viewpoints.gradient_candidates import gradient_candidates
 
+_OVERLAP_SCALE = 0.1
+"""ξ, as a share of what the robot's cone would hold if nothing were known in it."""
 _LEAST_RADIUS_M = 0.5
 """Lower bound of the radius within which candidates lie, which is r̂ of the latest scan or the reach."""
 
@@ -28,38 +30,16 @@ class MutualInformationConfig:
 
     Attributes:
         coordinated: Whether λ, η and ρ use what teammates announce.
-        overlap: Whether λ does (eq. 12); else it is 1.
-        overlap_scale: ξ, as a share of what the robot's cone would hold if nothing were known in it.
-        interference: η for each teammate in the candidate's cone, in ]0, 1]; 1 = they do not count.
-        teammates_block: Whether ρ is 0 where a teammate stands or drives.
-        static_reach: Whether ρ depends on what is believed covered; else it is 1.
-        occlusion: Whether obstacles hide voxels of cones; the paper's ignore them.
         distance_cost: κ.
-        known_sigma: σ of a voxel that counts as known, H = 0; None = the mission's σ_end.
-        repeats: A viewpoint that was chosen this often among the latest eight is a trap.
     """
 
     coordinated: bool = True
-    overlap: bool = True
-    overlap_scale: float = 0.1
-    interference: float = 0.5
-    teammates_block: bool = True
-    static_reach: bool = True
-    occlusion: bool = False
     distance_cost: float = 0.0
-    known_sigma: float | None = None
-    repeats: int = 2
 
     def __post_init__(self) -> None:
         """Check every field."""
-        for name in ("coordinated", "overlap", "teammates_block", "static_reach", "occlusion"):
-            check_kind(self, name, bool)
-        check_positive(self, "overlap_scale")
-        check(self, "interference", "a number above 0 up to 1", lambda v: 0 < v <= 1)
+        check_kind(self, "coordinated", bool)
         check_not_negative(self, "distance_cost")
-        if self.known_sigma is not None:
-            check(self, "known_sigma", "None, or a number from 1e-6 to 1e4", lambda v: 1e-6 <= v <= 1e4)
-        check(self, "repeats", "a whole number ≥ 1", lambda v: v >= 1 and v == int(v))
 
 
 class Neighbourhood:
@@ -77,14 +57,14 @@ class Neighbourhood:
         longest = longest_crossing(*grid.shape, math.inf, 1)
         self._crossing = Crossing(np.zeros(longest, np.int32), np.zeros(longest, np.int64))
         self._marks = np.zeros(grid.voxels, np.uint8)
-        sigma = scenario.ending.sigma_end if config.known_sigma is None else config.known_sigma
+        sigma = scenario.ending.sigma_end
         self._known_precision = float(sigma**-2)
         unknown_bits = gaussian_entropy_bits(scenario.sigma_prior) - gaussian_entropy_bits(sigma)
         self._unknown_bits = max(unknown_bits, 0.0)
 
     def best(self, view: RobotKnowledge) -> np.ndarray | None:
         """Return the viewpoint (5,) of eq. 13, map frame; None if no candidate has a gain above 0."""
-        grid, settings, robot = view.scenario.grid, self.config, view.kind.robot
+        grid, robot = view.scenario.grid, view.kind.robot
         edge, origin = grid.voxel_size_m, np.asarray(grid.origin_m)
         position = grid.in_grid_units(view.pose)[:3]
         depth_m = max(view.depth_m, _LEAST_RADIUS_M)
@@ -103,14 +83,7 @@ class Neighbourhood:
             Body((x, y, z), radius, float(robot.planning_radius_m / edge), footprint, self._crossing),
             Team(self._heard(view), self._marks),
             cone,
-            self._occlusion(view),
-            Factors(
-                float(settings.distance_cost),
-                scale_bits,
-                float(settings.interference) if settings.coordinated else 1.0,
-                settings.static_reach,
-                self._known_precision,
-            ),
+            Factors(float(self.config.distance_cost), scale_bits, self._known_precision),
         )
         if best < 0:
             return None
@@ -125,9 +98,6 @@ class Neighbourhood:
         shuffled = self._rng.permutation(len(candidates))
         return shuffled[np.argsort(-most[shuffled], kind="stable")]
 
-    def _occlusion(self, view: RobotKnowledge) -> Occlusion | None:
-        return Occlusion(view.mean.reshape(-1), *self._crossing) if self.config.occlusion else None
-
     def _own_cone(self, view: RobotKnowledge, depth: float) -> tuple[np.ndarray, float]:
         """Return the robot's cone, without an apex yet, and ξ, a share of the bits that it could hold."""
         sensor = view.kind.sensor
@@ -135,20 +105,17 @@ class Neighbourhood:
         cone = np.zeros(1, CONE)
         cosine = math.cos(view.half_angle_rad or min(widest, math.pi))  # before the first scan the widest ray
         cone["radius"], cone["cosine"] = depth, cosine
-        if not (self.config.coordinated and self.config.overlap):
-            return cone[0], math.inf
         voxels = 2.0 / 3.0 * math.pi * depth**3 * (1.0 - cosine)
-        return cone[0], max(self.config.overlap_scale * voxels * self._unknown_bits, 1e-9)
+        return cone[0], max(_OVERLAP_SCALE * voxels * self._unknown_bits, 1e-9)
 
     def _heard(self, view: RobotKnowledge) -> np.ndarray:
         """Return the teammates that the robot has heard, (M,) MATE, and mark the voxels of their cones."""
-        settings, grid = self.config, view.scenario.grid
+        grid = view.scenario.grid
         mates = [number for number, mate in view.teammates.items() if mate.heard_s >= 0.0]
-        if not settings.coordinated or not mates:
+        if not self.config.coordinated or not mates:
             return np.zeros(0, MATE)
-        heard = np.zeros(len(mates), MATE)
+        heard, cones = np.zeros(len(mates), MATE), []
         self._marks[:] = 0
-        occlusion = self._occlusion(view)
         own_m = view.kind.robot.body_radius_m
         for place, number in enumerate(mates):
             mate = view.teammates[number]
@@ -156,7 +123,8 @@ class Neighbourhood:
             touching_m = own_m + view.scenario.kind_of(number).robot.body_radius_m
             heard[place]["begin"] = grid.in_grid_units(mate.pose)[:3]
             heard[place]["end"] = grid.in_grid_units(mate.viewpoint if under_way else mate.pose)[:3]
-            heard[place]["touching"] = touching_m / grid.voxel_size_m if settings.teammates_block else -1.0
-            if settings.overlap and mate.announced_s >= 0.0 and mate.depth_m > 0.0:
-                mark_cone(announced_cone(grid, mate), grid.shape, occlusion, self._marks, 1)
+            heard[place]["touching"] = touching_m / grid.voxel_size_m
+            if mate.announced_s >= 0.0 and mate.depth_m > 0.0:
+                cones.append(announced_cone(grid, mate))
+        mark_cones(np.array(cones, CONE), grid.shape, self._marks, 1)
         return heard

@@ -19,7 +19,7 @@ from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.sensor import RangeSensor
 
 LEVELS = 20
-"""Intervals of occupancy, and of stretched occupancy, whose histograms are taken."""
+"""Intervals of occupancy whose histograms are taken."""
 _MIDDLES = (np.arange(LEVELS) + 0.5) / LEVELS
 UNCERTAINTY = -(_MIDDLES * np.log2(_MIDDLES) + (1.0 - _MIDDLES) * np.log2(1.0 - _MIDDLES))
 """(LEVELS,) -(p log2 p + (1 - p) log2(1 - p)) in the middle of each interval of occupancy."""
@@ -137,14 +137,13 @@ def _fill_occupancy(mean, precision, prior, occupancy, unknown):
 
 
 @lean_kernel
-def look(known, scan, viewpoint, stretched, view):
+def look(known, scan, viewpoint, view):
     """Fill in what a scan from a viewpoint is expected to show.
 
     Args:
         known: OccupancyMap.
         scan: ScanModel, all rays of the sensor.
         viewpoint: (5,) x, y, z in grid units, yaw, pitch.
-        stretched: Whether occupancies are stretched by distance (Sujan, eq. 7).
         view: View.
     """
     view.looks[0] += 1
@@ -168,38 +167,24 @@ def look(known, scan, viewpoint, stretched, view):
                 Crossing(view.crossed, view.entered),
             )
             for i in range(end.voxels):
-                _count(known, scan, start, stretched, view, view.crossed[i])
+                _count(known, view, view.crossed[i])
 
 
 @inlined_kernel
-def _count(known, scan, start, stretched, view, voxel):
+def _count(known, view, voxel):
     """Count a voxel in view, unless this look has met it before."""
     if view.stamps[voxel] == view.looks[0]:
         return
     view.stamps[voxel] = view.looks[0]
     p, row = np.float64(known.occupancy[voxel]), np.int64(known.unknown[voxel])
-    if stretched:
-        size = known.belief.size
-        x = voxel // (size[1] * size[2]) + 0.5 - start[0]
-        y = voxel // size[2] % size[1] + 0.5 - start[1]
-        z = voxel % size[2] + 0.5 - start[2]
-        p = stretched_occupancy(p, math.sqrt(x * x + y * y + z * z) * scan.voxel_size_m)
     if row == 1:
         view.seen[view.counts[1]] = voxel
     view.counts[row] += 1
     view.shares[row, min(int(p * LEVELS), LEVELS - 1)] += known.interest[voxel]
 
 
-@inlined_kernel
-def stretched_occupancy(p, distance_m):
-    """Return p″ of eq. 7, kept within [0, 1]; nearer than a metre counts as a metre."""
-    sure = 1.0 - p if p < 0.5 else p
-    stretched = 0.5 * (1.0 / (sure * max(distance_m, 1.0)) - 1.0)
-    return min(max(stretched if p < 0.5 else 1.0 - stretched, 0.0), 1.0)
-
-
 def voxels_in_view(sensor: RangeSensor, grid: Grid) -> float:
-    """Return the largest number of voxels that a sensor can see, N of eqs. 6 and 8.
+    """Return the largest number of voxels that a sensor can see, N of eq. 8.
 
     Its view in a plan is a sector, else a part of a ball.
     """
@@ -210,22 +195,16 @@ def voxels_in_view(sensor: RangeSensor, grid: Grid) -> float:
     return float(min(max(inside, 1.0), grid.voxels))
 
 
-def new_information(
-    shares: np.ndarray, most: float, weights: np.ndarray | None = UNCERTAINTY, linear: bool = False
-) -> float:
-    """Return NI in bits of the histograms of a view.
+def new_information(shares: np.ndarray, most: float) -> float:
+    """Return NI in bits of the histograms of a view (eq. 8).
 
         NI = Σ_known u(p_k)·(-q_k log2 q_k) + Σ_unknown u(p_k)·(-q_k log2 q_k)
 
-    with q_k = n_k/N. With u of `UNCERTAINTY` it is eq. 8; with u = 1 and stretched occupancies eq. 6, whose
-    second sum has lost its minus sign in print.
+    with q_k = n_k/N and u of `UNCERTAINTY`.
 
     Args:
         shares: (2, LEVELS) number of known and unknown voxels in each interval.
         most: N, the largest number of voxels in view.
-        weights: (LEVELS,) u; None = 1.
-        linear: Whether q_k stands in place of -q_k log2 q_k: ours, to compare with.
     """
     q = np.minimum(shares / most, 1.0)
-    bits = q if linear else -q * np.log2(np.where(q > 0.0, q, 1.0))
-    return float((bits if weights is None else bits * weights).sum())
+    return float((-q * np.log2(np.where(q > 0.0, q, 1.0)) * UNCERTAINTY).sum())

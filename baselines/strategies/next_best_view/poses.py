@@ -119,6 +119,8 @@ def localization_error(view: RobotKnowledge, paths: KnownPaths, pose: np.ndarray
 
 
 _LARGEST_OCCUPANCY = 0.05
+_INTEREST_DECAY = 1.0
+"""β of eq. 9: a voxel that did not answer keeps e^-β of the interest in it."""
 _STEEPEST_RAD = math.pi / 4
 """Robots that look up and down draw their pitch within this."""
 
@@ -147,12 +149,8 @@ class DrawnPoses(FrontierRule):
     until_reached, refines, turns_first = True, False, False
     poses = 100
     """m, drawn at each decision."""
-    interest_decay = 1.0
-    """β of eq. 9: a voxel that did not answer keeps e^-β of the interest in it."""
     extrapolates = False
     """Whether unknown cells of a plan take the mean occupancy of their neighbours; else ½."""
-    stretches = False
-    """Whether occupancies are stretched by distance (eq. 7)."""
     escapes = False
     """Whether a robot takes the first pose where its latest scan showed no new voxel."""
 
@@ -198,7 +196,7 @@ class DrawnPoses(FrontierRule):
             expectations.occupancy = known.occupancy
         best, most = 0, -math.inf
         for number, pose in enumerate(poses):
-            look(known, scan, grid.in_grid_units(pose), self.stretches, self.seen)
+            look(known, scan, grid.in_grid_units(pose), self.seen)
             worth = self.worth(scene, known, pose)
             if worth > most:
                 best, most = number, worth
@@ -210,4 +208,4 @@ class DrawnPoses(FrontierRule):
         expectations = self._expectations[view.robot]
         precision = view.precision.reshape(-1)[expectations.visible]
         silent = expectations.visible[precision <= np.float32(self._scenario.sigma_prior**-2)]
-        expectations.interest[silent] *= math.exp(-self.interest_decay)
+        expectations.interest[silent] *= math.exp(-_INTEREST_DECAY)

@@ -30,8 +30,8 @@ from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.scenario import Scenario
 
 _ALIKE_RAD = math.radians(15.0)
-_MEMORY = 8
-"""Latest choices of a robot among which repeated ones are a trap."""
+_MEMORY, _REPEATS = 8, 2
+"""Latest choices of a robot, and how often a viewpoint is among them that is a trap."""
 
 
 class MutualInformation(Driver):
@@ -72,7 +72,7 @@ class MutualInformation(Driver):
             self.decisions["nothing"] += 1
             return None
         alike = sum(_alike(viewpoint, earlier, edge_m) for earlier in chosen)
-        if alike >= self.config.repeats:
+        if alike >= _REPEATS:
             chosen.clear()
             self.decisions["trap"] += 1
             return random_viewpoint(view, self._rng)

@@ -17,55 +17,20 @@ Ours, where the paper says nothing: poses are drawn uniformly, a new set at each
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
-
 import numpy as np
 
 from baselines.strategies.next_best_view.expected_view import (
-    UNCERTAINTY,
     OccupancyMap,
     new_information,
     voxels_in_view,
 )
 from baselines.strategies.next_best_view.poses import DrawnPoses, localization_error, pose_distance
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.knowledge import voxel_of
 from entropy_explore_env.planner.scene import Scene
-from entropy_explore_env.settings.validation import check_choice, check_count, check_kind, check_within
 
-Measure = Literal["uncertainty", "stretched", "linear"]
-
-
-@dataclass(frozen=True)
-class NextBestViewConfig:
-    """How poses are rated.
-
-    Attributes:
-        poses: m, drawn at each decision.
-        distance_weight: w_d, bits a metre or radian, against w_NI = 1.
-        error_weight: w_LE, bits a metre of error.
-        measure: New information by eq. 8, `uncertainty`, which the paper prefers, or by eqs. 6-7,
-            `stretched`; `linear` is eq. 8 with q in place of -q log2 q, ours.
-        extrapolated: Whether unknown cells of a plan take the mean occupancy of their neighbours; else ½.
-        interest_decay: β of eq. 9: a voxel that did not answer keeps e^-β of the interest in it.
-
-    Raises:
-        SettingError: One of them is not allowed.
-    """
-
-    poses: int = 100
-    distance_weight: float = 0.01
-    error_weight: float = 0.0
-    measure: Measure = "uncertainty"
-    extrapolated: bool = True
-    interest_decay: float = 1.0
-
-    def __post_init__(self) -> None:
-        """Check every field."""
-        check_choice(self, "measure")
-        check_kind(self, "extrapolated", bool)
-        check_count(self, "poses", 1, 100_000)
-        check_within(self, "distance_weight", "error_weight", "interest_decay", least=0.0, most=1e6)
+_DISTANCE_WEIGHT = 0.01
+"""w_d, bits a metre or radian, against w_NI = 1."""
 
 
 class NextBestView(DrawnPoses):
@@ -73,20 +38,23 @@ class NextBestView(DrawnPoses):
 
     rule = "next-best-view"
 
-    def __init__(self, config: NextBestViewConfig | None = None) -> None:
-        """Take the settings; None = the defaults."""
-        self.config = config or NextBestViewConfig()
-        self.poses, self.interest_decay = self.config.poses, self.config.interest_decay
-        self.extrapolates = self.config.extrapolated
-        self.stretches = self.config.measure == "stretched"
+    extrapolates = True
+
+    def __init__(self, error_weight: float = 0.0) -> None:
+        """Take w_LE, bits a metre of error.
+
+        Raises:
+            SettingError: It is no number from 0 to 1e6.
+        """
+        if not 0.0 <= error_weight <= 1e6:
+            raise SettingError("error_weight", error_weight, "a number from 0 to 1e6")
+        self.error_weight = error_weight
 
     def worth(self, scene: Scene, known: OccupancyMap, pose: np.ndarray) -> float:
         """Return RF of a pose; see `DrawnPoses`."""
-        view, config = scene.view, self.config
-        most = voxels_in_view(view.kind.sensor, view.scenario.grid)
-        weights = None if self.stretches else UNCERTAINTY
-        bits = new_information(self.seen.shares, most, weights, linear=config.measure == "linear")
-        costs = config.distance_weight * pose_distance(view.pose, pose)
-        if config.error_weight > 0.0:
-            costs += config.error_weight * localization_error(view, scene.paths, pose)
+        view = scene.view
+        bits = new_information(self.seen.shares, voxels_in_view(view.kind.sensor, view.scenario.grid))
+        costs = _DISTANCE_WEIGHT * pose_distance(view.pose, pose)
+        if self.error_weight > 0.0:
+            costs += self.error_weight * localization_error(view, scene.paths, pose)
         return (bits - costs) * (1.0 - float(known.occupancy[voxel_of(view, pose)]))

@@ -139,7 +139,6 @@ def test_lazily_is_as_eagerly_in_plans(monkeypatch, metric, allocation):
         {"frontiers": FrontierConfig(gamma=None)},
         {"beta": 60.0},
         {"frontiers": FrontierConfig(visibility="naive")},
-        {"frontiers": FrontierConfig(unexplored_ground="level")},
     ],
 )
 def test_lazily_is_as_eagerly_over_terrain(monkeypatch, settings):
