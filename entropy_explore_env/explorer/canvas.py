@@ -10,7 +10,6 @@ import numpy as np
 
 from entropy_explore_env.belief.map_update import PRIOR_MEAN
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.worlds.world import box_around
 
 _ON_LATTICE = 0.01
 """Two grids share a lattice whose corners differ from whole voxels by no more than this, in voxel edges."""
@@ -57,15 +56,6 @@ class Canvas:
         theirs = tuple(slice(a, max(a, b)) for a, b in zip(first - low, last - low, strict=True))
         bigger.mean[theirs], bigger.precision[theirs] = self.mean[mine], self.precision[mine]
         return bigger
-
-
-def box_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the first voxel (3,) int64 of a mask's box, and the one past its last; None = it is empty."""
-    if not mask.any():
-        return None
-    box = box_around(mask)
-    low, high = [part.start for part in box], [part.stop for part in box]
-    return np.array(low, np.int64), np.array(high, np.int64)
 
 
 def grid_of(shape: np.ndarray, voxel_size_m: float, origin_m: np.ndarray) -> Grid:

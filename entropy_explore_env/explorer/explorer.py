@@ -22,9 +22,9 @@ from entropy_explore_env.explorer.given_maps import (
     Values,
     checked_origin,
     has_size,
-    occupancy_of,
+    occupancies_of,
     patch_of_map,
-    patch_of_occupancy,
+    patch_of_occupancies,
 )
 from entropy_explore_env.explorer.goals import Decider, Goal, NoGoal, Why, checked_pose, poses_by_number
 from entropy_explore_env.explorer.ground import Ground, boxes_around
@@ -56,8 +56,9 @@ class Explorer:
         explorer.set_map(grid, origin=(-10.0, -8.0, 0.0))
         goal = explorer.goal(poses, robot=0)
 
-    Maps may grow and move from call to call. Unknown margins are cropped; where the map outgrows its crop, or
-    turns, the strategy begins anew in the larger one.
+    Maps may grow and move from call to call. Unknown margins are cropped. Where the map outgrows its crop,
+    `planned-rate` goes on in a larger one; another strategy without `grow`, and any one where the map turns
+    or moves by parts of a voxel, begins anew.
 
     Attributes:
         no_goal: Why the latest call of `goal` returned None; None = it did not.
@@ -114,13 +115,18 @@ class Explorer:
         self._follow()
 
     def _follow(self) -> None:
-        """Let the strategy begin anew where the canvas is another one."""
+        """Let the strategy go on where the canvas has grown, or begin anew where it is another one."""
         if self._begun == self._ground.begun:
             return
-        workspace = self._ground.workspace
+        workspace, shift = self._ground.workspace, self._ground.shift
         episode, self._begun = self._begun, self._ground.begun
-        self._strategy.reset(workspace.scenario, generator(self._seed, episode, Stream.STRATEGY))
-        self._unbegun = set(range(len(self._seats)))
+        grow = getattr(self._strategy, "grow", None)
+        if shift is None or grow is None:
+            self._strategy.reset(workspace.scenario, generator(self._seed, episode, Stream.STRATEGY))
+            self._unbegun = set(range(len(self._seats)))
+        else:
+            grow(workspace.scenario, shift)
+        workspace.search = getattr(self._strategy, "search", None)
         for seat in self._seats:
             seat.turn(self._yaw_rad - workspace.canvas.yaw_rad)
         for name in ("pose", "announced"):
@@ -153,7 +159,7 @@ class Explorer:
         """Take a map in place of what was believed of the voxels that it covers.
 
         Args:
-            grid: (X, Y) or (X, Y, Z) occupancies, see `given_maps.occupancy_of`; or a Map with σ.
+            grid: (X, Y) or (X, Y, Z) occupancies, see `given_maps.occupancies_of`; or a Map with σ.
             origin: (x, y, yaw) of the grid's corner in the map frame, yaw counter-clockwise about it. None =
                 as that of the latest map, if this one has its size; of the first one (0, 0, 0).
             bottom_m: Height z of the corner.
@@ -167,13 +173,13 @@ class Explorer:
         if isinstance(grid, Map):
             self._take_map(patch_of_map(grid, self._task))
             return
-        occupancy = occupancy_of(grid, values, unknown_between)
+        given = occupancies_of(grid, values, unknown_between)
         if not is_number(bottom_m) or not abs(bottom_m) <= 1e9:
             raise SettingError("bottom_m", bottom_m, "a finite number")
-        if origin is None and self._shape not in (None, occupancy.mean.shape):
+        if origin is None and self._shape not in (None, given.grid.shape):
             raise SettingError("origin", None, f"(x, y, yaw) of a map that is no longer {self._shape}")
         corner = self._corner if origin is None else checked_origin(origin)
-        self._take_map(patch_of_occupancy(occupancy, corner, float(bottom_m), self._task))
+        self._take_map(patch_of_occupancies(given, corner, float(bottom_m), self._task))
 
     def set_map_message(self, message: Any, **how: Any) -> None:  # noqa: ANN401 - any class with the fields
         """Take a nav_msgs/OccupancyGrid of any class, whose rows run along x; `how` as for `set_map`.
@@ -198,7 +204,7 @@ class Explorer:
         bits, gains = self._ground.write(low, patch, boxes)
         for seat, gain in zip(self._seats, gains.tolist(), strict=True):
             seat.note_map(gain, bits - gain)
-        self._shape, self._corner = patch.mean.shape, patch.corner
+        self._shape, self._corner = patch.shape, patch.corner
 
     def add_scan(self, pose: Sequence[float] | np.ndarray, measured: np.ndarray, robot: int = 0) -> float:
         """Fuse a scan into the belief, and return the bits that it brought.
@@ -352,15 +358,21 @@ class Explorer:
 
         A rule begins by a look around. On a map that shows all around already, that is taken as done.
         """
-        seat, together = self._seats[robot], getattr(self._strategy, "choose_all", None)
+        seat, together, self._homewards = (
+            self._seats[robot],
+            getattr(self._strategy, "choose_all", None),
+            False,
+        )
         found_nothing = getattr(self._strategy, "found_nothing", None)
         while True:
             moment = self._time_s, end, self._ground.entropy_bits
             view = view_of_seat(workspace, self._seats, self._heard, robot, pose, moment)
             chosen = self._strategy.choose(view) if together is None else together([view])[0]
-            if found_nothing is not None and found_nothing(robot):
-                return None, None
             viewpoint = checked_pose("viewpoint chosen", chosen)
+            if found_nothing is not None and found_nothing(robot):
+                self._homewards = self._task.ending.return_to_start
+                if not self._homewards or self._apart_m(robot, pose, viewpoint) <= self._arrival_m:
+                    return None, None
             outlook = workspace.outlook(robot, pose, viewpoint)
             stands = self._apart_m(robot, pose, viewpoint) < 0.5 * self._task.grid.voxel_size_m
             begins = robot in self._unbegun
@@ -378,6 +390,8 @@ class Explorer:
         if workspace.scenario.in_planes:
             there[2] = path[:, 2] = given[2]
         why = Why.EXPLORES if outlook.bits > _NOTHING_BITS else Why.PASSES
+        if self._homewards:
+            why = Why.RETURNS
         if why is Why.PASSES and end is MoveEnd.TEAMMATE:
             why = Why.GIVES_WAY
         return Goal(there, path, outlook.bits, outlook.seconds, why)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -12,6 +13,7 @@ from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.settings.grid import MAX_VOXELS
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.validation import is_number
+from entropy_explore_env.worlds.world import box_around
 
 Values = Literal["percent", "probability", "log_odds"]
 UNKNOWN_BETWEEN = (0.45, 0.55)
@@ -25,19 +27,43 @@ _SAME_SIZE = 1e-3
 """Share by which the size of voxels of a map may differ from what was asked for: float32 in messages."""
 
 
-class Occupancy(NamedTuple):
-    """A grid of occupancies as coverage."""
-
-    mean: np.ndarray
-    """(X, Y, Z) float32 expected coverage; ½ where it is unknown."""
-    known: np.ndarray
-    """(X, Y, Z) bool."""
+_AT_ONCE = 1 << 18
+"""Voxels of a map that are turned into a belief at once, so that large maps take little memory."""
 
 
-def occupancy_of(
+class Occupancies(NamedTuple):
+    """A grid of occupancies in one of their forms."""
+
+    grid: np.ndarray
+    """(X, Y, Z)."""
+    form: str
+    """What its numbers are: "occupied", or one of `Values`."""
+    unknown_between: tuple[float, float]
+
+    def rows(self, first: int, last: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return of the X from the first up to but without the last one (X, Y, Z) mean and known.
+
+        The mean is the expected coverage in float32, ½ where it is unknown.
+        """
+        array, (low, high) = self.grid[first:last], self.unknown_between
+        if self.form == "occupied":
+            return array.astype(np.float32), np.ones(array.shape, np.bool_)
+        if self.form == "percent":
+            known, mean = array != _PERCENT_UNKNOWN, (array * np.float32(0.01)).astype(np.float32)
+        else:
+            known = ~np.isnan(array)
+            mean = np.where(known, array, 0.0).astype(np.float32)
+            if self.form == "log_odds":
+                mean = np.reciprocal(1.0 + np.exp(np.clip(-mean, -80.0, 80.0)), dtype=np.float32)
+        known &= (mean < low) | (mean > high)
+        mean[~known] = 0.5
+        return mean, known
+
+
+def occupancies_of(
     grid: object, values: Values | None = None, unknown_between: tuple[float, float] = UNKNOWN_BETWEEN
-) -> Occupancy:
-    """Return the expected coverage of an occupancy grid.
+) -> Occupancies:
+    """Return an occupancy grid with the form of its numbers.
 
     Args:
         grid: (X, Y) or (X, Y, Z). Whole numbers are percent, with -1 for unknown, as in ROS's OccupancyGrid;
@@ -52,16 +78,20 @@ def occupancy_of(
     if array.ndim not in (2, 3) or array.dtype.kind not in "biuf" or not 0 < array.size <= MAX_VOXELS:
         raise SettingError("grid", grid, "a NumPy array (X, Y) or (X, Y, Z) of numbers")
     array = array[:, :, None] if array.ndim == 2 else array
-    low, high = _checked_between(unknown_between)
+    between = _checked_between(unknown_between)
     if array.dtype.kind == "b":
-        return Occupancy(array.astype(np.float32), np.ones(array.shape, np.bool_))
+        return Occupancies(array, "occupied", between)
     form = values or ("probability" if array.dtype.kind == "f" else "percent")
     if form not in get_args(Values):
         raise SettingError("values", values, one_of(values, get_args(Values)))
-    mean, known = _percent(array, values) if form == "percent" else _probabilities(array, form)
-    known &= (mean < low) | (mean > high)
-    mean[~known] = 0.5
-    return Occupancy(mean, known)
+    if form == "percent":
+        _check_percents(array, values)
+    elif form == "probability":
+        least, most = np.fmin.reduce(array, axis=None), np.fmax.reduce(array, axis=None)  # NaN is unknown
+        if least < 0.0 or most > 1.0:
+            allowed = "probabilities from 0 to 1; others with values='log_odds' or 'percent'"
+            raise SettingError("grid", f"{least:g} … {most:g}", allowed)
+    return Occupancies(array, form, between)
 
 
 def _checked_between(between: object) -> tuple[float, float]:
@@ -75,8 +105,8 @@ def _checked_between(between: object) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _percent(array: np.ndarray, values: str | None) -> tuple[np.ndarray, np.ndarray]:
-    """Return mean and known of percents; -1 = unknown."""
+def _check_percents(array: np.ndarray, values: str | None) -> None:
+    """Raise a SettingError unless numbers are percents."""
     if array.dtype.kind == "f" and not (np.isfinite(array).all() and (array == np.rint(array)).all()):
         raise SettingError("grid", array, "whole numbers where values are percent")
     least, most = array.min(), array.max()
@@ -85,21 +115,6 @@ def _percent(array: np.ndarray, values: str | None) -> tuple[np.ndarray, np.ndar
     if values is None and most == 1:
         allowed = "booleans, or values='percent' if it is 1 % that is meant"
         raise SettingError("grid", "whole numbers of which 1 is the largest", allowed)
-    return (array * np.float32(0.01)).astype(np.float32), array != _PERCENT_UNKNOWN
-
-
-def _probabilities(array: np.ndarray, form: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return mean and known of probabilities or log-odds; NaN = unknown."""
-    known = ~np.isnan(array)
-    mean = np.where(known, array, 0.0).astype(np.float32)
-    if form == "log_odds":
-        mean = np.reciprocal(1.0 + np.exp(np.clip(-mean, -80.0, 80.0)), dtype=np.float32)
-    elif mean.min() < 0.0 or mean.max() > 1.0:
-        found = f"{mean.min():g} … {mean.max():g}"
-        raise SettingError(
-            "grid", found, "probabilities from 0 to 1; others with values='log_odds' or 'percent'"
-        )
-    return mean, known
 
 
 def checked_origin(origin: object) -> tuple[float, float, float]:
@@ -118,16 +133,62 @@ def checked_origin(origin: object) -> tuple[float, float, float]:
 class Patch(NamedTuple):
     """A map that was given."""
 
-    mean: np.ndarray
-    """(X, Y, Z) float32 expected coverage."""
-    precision: np.ndarray
-    """(X, Y, Z) float32; that of the prior where nothing is known."""
-    known: np.ndarray
-    """(X, Y, Z) bool."""
+    given: Occupancies | Map
+    box: tuple[np.ndarray, np.ndarray] | None
+    """First voxel (3,) int64 of the box of what is known, and the one past its last; None = nothing is."""
     corner: tuple[float, float, float]
     """x, y, yaw in the map frame."""
     bottom_m: float
     """Height of the corner."""
+    precisions: tuple[np.float32, np.float32]
+    """That of the prior, where nothing is known, and that of what an occupancy grid says."""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """(X, Y, Z)."""
+        return self.given.mean.shape if isinstance(self.given, Map) else self.given.grid.shape
+
+    def parts(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+        """Yield (x, mean, precision) of rows that together are the map; x is that of the first of them.
+
+        Arrays are (X, Y, Z) float32.
+        """
+        prior, told = self.precisions
+        for first, last in _rows(self.shape):
+            if isinstance(self.given, Map):
+                mean, precision = self.given.mean[first:last], self.given.precision[first:last]
+                known = self.given.known[first:last]
+                yield first, mean, np.where(known, np.maximum(precision, prior), prior)
+            else:
+                mean, known = self.given.rows(first, last)
+                yield first, mean, np.where(known, told, prior)
+
+
+def _rows(shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
+    """Yield the first x and the one past the last of rows of an (X, Y, Z) map that are taken at once."""
+    at_once = max(1, _AT_ONCE // (shape[1] * shape[2]))
+    for first in range(0, shape[0], at_once):
+        yield first, min(first + at_once, shape[0])
+
+
+def box_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the first voxel (3,) int64 of a mask's box, and the one past its last; None = it is empty."""
+    if not mask.any():
+        return None
+    box = box_around(mask)
+    low, high = [part.start for part in box], [part.stop for part in box]
+    return np.array(low, np.int64), np.array(high, np.int64)
+
+
+def _box_of(given: Occupancies) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the box of what is known of a grid: see `Patch`."""
+    low, high = np.array(given.grid.shape), np.zeros(3, np.int64)
+    for first, last in _rows(given.grid.shape):
+        box = box_of(given.rows(first, last)[1])
+        if box is not None:
+            at = np.array([first, 0, 0])
+            low, high = np.minimum(low, box[0] + at), np.maximum(high, box[1] + at)
+    return (low, high) if high.any() else None
 
 
 def has_size(voxel_size_m: float, task: Scenario) -> bool:
@@ -143,15 +204,14 @@ def patch_of_map(given: Map, task: Scenario) -> Patch:
     """
     if not has_size(given.grid.voxel_size_m, task):
         raise SettingError("grid", given, f"a map with voxels of {task.grid.voxel_size_m:g} m")
-    (x, y, z), known, prior = given.grid.origin_m, given.known, np.float32(task.sigma_prior**-2)
-    precision = np.where(known, np.maximum(given.precision, prior), prior)
-    return Patch(given.mean, precision, known, (x, y, given.yaw_rad), z)
+    (x, y, z), prior = given.grid.origin_m, np.float32(task.sigma_prior**-2)
+    return Patch(given, box_of(given.known), (x, y, given.yaw_rad), z, (prior, prior))
 
 
-def patch_of_occupancy(
-    occupancy: Occupancy, corner: tuple[float, float, float], bottom_m: float, task: Scenario
+def patch_of_occupancies(
+    given: Occupancies, corner: tuple[float, float, float], bottom_m: float, task: Scenario
 ) -> Patch:
     """Return an occupancy grid as a patch of a task's belief: what it says is as certain as the task asks."""
     sigma = _FINER * min(_KNOWN_SIGMA, task.ending.sigma_end)
-    precision = np.where(occupancy.known, np.float32(sigma**-2), np.float32(task.sigma_prior**-2))
-    return Patch(occupancy.mean, precision, occupancy.known, corner, bottom_m)
+    precisions = np.float32(task.sigma_prior**-2), np.float32(sigma**-2)
+    return Patch(given, _box_of(given), corner, bottom_m, precisions)

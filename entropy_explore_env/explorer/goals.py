@@ -21,6 +21,7 @@ class Why(enum.Enum):
     EXPLORES = "A scan from there is expected to see what is unknown."
     PASSES = "It lies on the way to what is unknown."
     GIVES_WAY = "The robot makes room for a teammate."
+    RETURNS = "Nothing is left to see, and the robot drives back to where it started."
 
 
 class NoGoal(enum.Enum):
@@ -51,7 +52,11 @@ class Goal:
 
 
 class Decider(Protocol):
-    """A strategy: see docs/own_strategy.md. Where it has `choose_all`, that is called with the one view."""
+    """A strategy: see docs/own_strategy.md. Where it has `choose_all`, that is called with the one view.
+
+    Where the map has outgrown its grid, `grow(scenario, shift)` is called in place of `reset`, if the
+    strategy has it: voxel (0, 0, 0) of the grid before has the indices `shift`, (3,) int64, in the new one.
+    """
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin, or begin anew in another grid."""

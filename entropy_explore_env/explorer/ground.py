@@ -10,8 +10,8 @@ import numpy as np
 from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.belief.replacement import replace_region
 from entropy_explore_env.errors import CallOrderError, SettingError
-from entropy_explore_env.explorer.canvas import Canvas, box_of, grid_of
-from entropy_explore_env.explorer.given_maps import Patch
+from entropy_explore_env.explorer.canvas import Canvas, grid_of
+from entropy_explore_env.explorer.given_maps import Patch, box_of
 from entropy_explore_env.explorer.workspace import Workspace
 from entropy_explore_env.robots.rotations import turned_by
 from entropy_explore_env.settings.grid import Grid
@@ -27,6 +27,7 @@ class Ground:
 
     Attributes:
         begun: How many canvases there were: with each one, numbers of voxels change.
+        shift: (3,) int64, where in the canvas the first voxel of the one before lies; None = it has others.
         entropy_bits: Entropy of the belief.
     """
 
@@ -37,6 +38,7 @@ class Ground:
         self._voxel_bits = float(map_entropy_bits(np.full((1, 1, 1), self._prior, np.float32)))
         self._workspace: Workspace | None = None
         self.begun, self.entropy_bits = 0, 0.0
+        self.shift: np.ndarray | None = None
         if fixed:
             self._begin(Canvas(task.grid, 0.0, self._prior), 0.0, fixed=True)
 
@@ -55,8 +57,11 @@ class Ground:
     def _canvas(self) -> Canvas | None:
         return None if self._workspace is None else self._workspace.canvas
 
-    def _begin(self, canvas: Canvas, known_bits: float, fixed: bool = False) -> None:
+    def _begin(
+        self, canvas: Canvas, known_bits: float, fixed: bool = False, shift: np.ndarray | None = None
+    ) -> None:
         """Plan in another canvas, of which this many bits are known."""
+        self.shift = None if self._workspace is None else shift
         task = self._task if fixed else dataclasses.replace(self._task, grid=canvas.grid)
         self._workspace, self.begun, self._fixed = Workspace(canvas, task), self.begun + 1, fixed
         self.entropy_bits = canvas.grid.voxels * self._voxel_bits - known_bits
@@ -87,8 +92,8 @@ class Ground:
         Raises:
             SettingError: Nothing is known of it, or it has other dimensions than the map before.
         """
-        shape, (x, y, yaw_rad), canvas = patch.mean.shape, patch.corner, self._canvas
-        box, flat = box_of(patch.known), patch.mean.shape[2] == 1
+        shape, box, canvas = patch.shape, patch.box, self._canvas
+        (x, y, yaw_rad), flat = patch.corner, shape[2] == 1
         if box is None:
             raise SettingError("grid", "nothing but unknown voxels", "a map of which something is known")
         if canvas is not None and flat != canvas.grid.flat:
@@ -117,7 +122,7 @@ class Ground:
             box = np.minimum(box[0], known[0]), np.maximum(box[1], known[1])
         low, high = self._with_margin(box, layers, 2)
         known_bits = canvas.grid.voxels * self._voxel_bits - self.entropy_bits
-        self._begin(canvas.grown(low, high), known_bits)
+        self._begin(canvas.grown(low, high), known_bits, shift=-low)
         return low
 
     def room_for_scan(self, pose: np.ndarray, sensor: RangeSensor) -> None:
@@ -157,10 +162,11 @@ class Ground:
         Returns:
             Bits that this took from the belief, and (B,) those inside each box.
         """
-        canvas, gains = self.workspace.canvas, np.zeros(len(boxes))
+        canvas, gains, bits = self.workspace.canvas, np.zeros(len(boxes)), 0.0
         belief = canvas.mean.reshape(-1), canvas.precision.reshape(-1)
-        arrays = np.ascontiguousarray(patch.mean), np.ascontiguousarray(patch.precision)
-        bits = float(replace_region(belief, canvas.grid.shape, low, arrays, boxes, gains))
+        for x, mean, precision in patch.parts():
+            at = low + np.array([x, 0, 0])
+            bits += float(replace_region(belief, canvas.grid.shape, at, (mean, precision), boxes, gains))
         self.entropy_bits -= bits
         return bits, gains
 

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from entropy_explore_env.belief.paths.search import Search
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.planner.tour import SharedTour
@@ -63,14 +64,30 @@ class PlannedRate:
         self._by_frontiers = [weights is None and explores_frontiers(scenario, kind) for kind in kinds]
         """Whether each robot goes for frontier cells, and home when there are none."""
         self._returns = scenario.ending.return_to_start
+        self._parts: list[SharedTour | ViewProposer] = []
         if any(self._by_frontiers) or self._returns:
             self._tours = SharedTour()
             self._tours.backs_off = False  # whatever the planner chooses is followed so
             self._tours.reset(scenario, rng)
+            self._parts.append(self._tours)
         if not all(self._by_frontiers):
-            most = 1 if weights is None else weights.candidates
-            proposing = with_settings(scenario, {"action": {"kind": "candidates", "candidates": most}})
-            self._proposer = ViewProposer(proposing, rng)
+            self._proposer = ViewProposer(self._proposing(scenario), rng)
+            self._parts.append(self._proposer)
+
+    def _proposing(self, scenario: Scenario) -> Scenario:
+        """Return a scenario with as many candidates as are compared."""
+        most = 1 if self.weights is None else self.weights.candidates
+        return with_settings(scenario, {"action": {"kind": "candidates", "candidates": most}})
+
+    def grow(self, scenario: Scenario, shift: np.ndarray) -> None:
+        """Go on in a larger grid: see `explorer.goals.Decider`."""
+        for part in self._parts:
+            part.grow(self._proposing(scenario), shift)
+
+    @property
+    def search(self) -> Search:
+        """Memory of its path searches, which nothing needs from one decision to the next."""
+        return self._tours.search if any(self._by_frontiers) else self._proposer.search
 
     def choose(self, view: RobotView) -> np.ndarray:
         """Return the viewpoint (5,) by the robot's own belief and what it has heard."""

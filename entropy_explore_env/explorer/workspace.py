@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.fields import Belief
+from entropy_explore_env.belief.paths.search import Search
 from entropy_explore_env.explorer.canvas import Canvas
 from entropy_explore_env.missions.records import WAYPOINTS
 from entropy_explore_env.missions.rules import rules_of
@@ -51,11 +52,13 @@ class Workspace:
         canvas: The belief.
         scenario: The task, in the canvas's grid.
         rules: The scenario for compiled code.
+        search: Memory of path searches that the strategy lends between its decisions; None = there is none.
     """
 
     def __init__(self, canvas: Canvas, scenario: Scenario) -> None:
         """Take a canvas and a task in its grid."""
         self.canvas, self.scenario, self.rules = canvas, scenario, rules_of(scenario)
+        self.search: Search | None = None
         self._sensors = [sensor_model(kind.sensor) for kind in scenario.kinds]
 
     @cached_property
@@ -64,7 +67,7 @@ class Workspace:
 
     @cached_property
     def _navigators(self) -> dict[int, Navigator]:
-        return new_navigators(self.scenario)
+        return new_navigators(self.scenario, self.search)
 
     def _kind_number(self, robot: int) -> int:
         return robot % len(self.scenario.kinds)

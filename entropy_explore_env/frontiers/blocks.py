@@ -48,7 +48,7 @@ class VoxelStates(NamedTuple):
     state: np.ndarray
     """(V,) uint8: UNEXPLORED, UNMAPPED, COVERED."""
     changed: np.ndarray
-    """(V,) int32, the voxels that changed in the latest update come first."""
+    """(N,) int32, the voxels that changed in the latest update come first: N is the most in one update."""
     opened: np.ndarray
     """(V + X·Y,) int32, the first `opened_count` are voxels past which more may be visible than before."""
     opened_count: np.ndarray
@@ -56,12 +56,12 @@ class VoxelStates(NamedTuple):
     size: tuple[int, int, int]
 
 
-def new_states(shape: tuple[int, int, int]) -> VoxelStates:
-    """Return the states of (X, Y, Z) voxels of which nothing is explored."""
+def new_states(shape: tuple[int, int, int], at_once: int) -> VoxelStates:
+    """Return the states of (X, Y, Z) voxels of which nothing is explored; `at_once` are updated at once."""
     voxels = math.prod(shape)
     return VoxelStates(
         state=np.full(voxels, UNEXPLORED | UNMAPPED, np.uint8),
-        changed=np.zeros(voxels, np.int32),
+        changed=np.zeros(min(voxels, at_once), np.int32),
         opened=np.zeros(voxels + shape[0] * shape[1], np.int32),
         opened_count=np.zeros(1, np.int64),
         size=(int(shape[0]), int(shape[1]), int(shape[2])),
@@ -84,21 +84,23 @@ def note_opened(states, voxel):
 
 
 @lean_kernel
-def update_states(states, mean, precision, levels):
-    """Bring the states up to date with a belief.
+def update_states(states, mean, precision, levels, begin, end):
+    """Bring the states of the voxels from `begin` up to but without `end` up to date with a belief.
 
     Args:
         states: Of the robot.
         mean: (V,) float32.
         precision: (V,) float32 1/σ² > 0.
         levels: (explored, mapped): precisions from which on a voxel is explored, and mapped.
+        begin: Number of the first voxel.
+        end: One past the last; there are no more than `states.changed` holds.
 
     Returns:
-        How many voxels are in another state than at the latest update.
+        How many of them are in another state than at the latest update.
     """
     state, count = states.state, 0
-    for first in range(0, len(state), _TOGETHER):
-        last, different = min(first + _TOGETHER, len(state)), np.uint8(0)
+    for first in range(begin, end, _TOGETHER):
+        last, different = min(first + _TOGETHER, end), np.uint8(0)
         for voxel in range(first, last):
             different |= state[voxel] ^ _state_of(mean[voxel], precision[voxel], levels)
         if different == 0:

@@ -9,12 +9,13 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from entropy_explore_env.frontiers.blocks import EXCLUDED, NONE, UNMAPPED, Blocks, VoxelStates, mark_around
-from entropy_explore_env.frontiers.visibility import forget_in_range, new_counter
+from entropy_explore_env.frontiers.visibility import VisibilityCounter, forget_in_range, new_counter
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
@@ -70,8 +71,6 @@ class FrontierMap(ABC):
 
     point: float
     """Size of a point: m² in plans and over terrain, else m³."""
-    body_reach: int
-    """Voxels that the body extends beyond its own, along an axis."""
     _states: VoxelStates
     _blocks: Blocks
     _costs: np.ndarray
@@ -97,15 +96,22 @@ class FrontierMap(ABC):
         self.reach = min(kind.sensor.max_range_m / self._edge, float(sum(grid.shape)))
         self._spacing = max(round((frontiers.spacing_m or self.reach * self._edge / 6.0) / self._edge), 1)
         """Voxels between candidates."""
-        self.changed = 0
+        self.changed, self._has_bounds = 0, False
 
-    def _start(self, points: int) -> None:
-        """Prepare counts of points, once states, blocks, costs and candidates are there."""
-        self._counter = new_counter(points, self._size)
-        self._bounds = np.full(len(self._costs), np.inf)
+    @cached_property
+    def _counter(self) -> VisibilityCounter:
+        """Counts of points; rules that count none need no memory for it."""
+        return new_counter(len(self._blocks.state), self._size)
+
+    @cached_property
+    def _bounds(self) -> np.ndarray:
         """(V,) float64, upper bounds of V·(height factor) in voxels; inf = unknown."""
-        self._has_bounds = False
-        self.body_reach = self._blocks.reach
+        return np.full(len(self._costs), np.inf)
+
+    @property
+    def body_reach(self) -> int:
+        """Voxels that the body extends beyond its own, along an axis."""
+        return self._blocks.reach
 
     @property
     def traversal_cost(self) -> np.ndarray:

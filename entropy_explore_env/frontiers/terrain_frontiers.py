@@ -87,7 +87,7 @@ def new_terrain_map(
         spacing: Voxels between candidates, along all axes.
         ceiling: (X, Y) lowest layer of the no-fly zone.
     """
-    footprint, states = body_footprint((3, 3, 3), body_radius, None), new_states(shape)
+    footprint, states = body_footprint((3, 3, 3), body_radius, None), new_states(shape, math.prod(shape))
     reach, voxels = int(np.abs(footprint).max()), math.prod(shape)
     square = np.array([(x, y, 0) for x in range(-reach, reach + 1) for y in range(-reach, reach + 1)])
     state = np.full(shape[0] * shape[1], UNEXPLORED | UNMAPPED, np.uint8)
@@ -110,7 +110,7 @@ def new_terrain_map(
 def update_terrain(terrain, mean, precision, levels):
     """Bring a TerrainMap up to date with a belief; arguments and result as of `update_states`."""
     columns, before = terrain.columns, NONE
-    changed = update_states(terrain.states, mean, precision, levels)
+    changed = update_states(terrain.states, mean, precision, levels, 0, len(mean))
     for voxel in terrain.states.changed[:changed]:
         column = voxel // terrain.size[2]
         if column != before:
@@ -233,7 +233,6 @@ class TerrainFrontiers(FrontierMap):
         self._states, self._blocks = self._map.states, self._map.columns
         self._costs, self._marks = self._map.traversal_cost, self._map.excluded
         self._voxels = self._map.voxel.reshape(-1)
-        self._start(x * y)
         yaws, tilt = yaws_around(self.reach), kind.sensor.field_of_view_rad[1]
         self._rays = np.stack([np.cos(yaws), np.sin(yaws)], axis=-1)
         self._gaze_pitches = (0.5 * math.pi - 0.5 * tilt,)  # the lowest rays lead straight down

@@ -36,6 +36,7 @@ from entropy_explore_env.frontiers.visibility import (
     rays_towards,
 )
 from entropy_explore_env.frontiers.voxel_map import (
+    AT_ONCE,
     body_footprint,
     collect_candidates,
     count_connected,
@@ -61,12 +62,11 @@ class VoxelFrontiers(FrontierMap):
         """Take the settings; without them, blocks have an edge of BLOCK voxels. Nothing is explored yet."""
         edge, layer = scenario.grid.voxel_size_m, scenario.layer_of(kind.robot)
         super().__init__(scenario, kind, frontiers or FrontierConfig(spacing_m=BLOCK * edge))
-        self._states = new_states(self._size)
+        self._states = new_states(self._size, AT_ONCE)
         footprint = body_footprint(self._size, kind.robot.planning_radius_m / edge, layer)
         self._blocks = new_blocks(self._size, self._states.state, footprint, layer, self._spacing)
         self._costs = np.full(scenario.grid.voxels, np.inf, np.float32)
         self._voxels, self._marks = self._blocks.candidate, self._blocks.flags
-        self._start(scenario.grid.voxels)
         self._pitches = imagined_pitches(kind, layer is None)
         self._rays = rays_around(self.reach, self._pitches)
         self._gaze_pitches = (0.0, -0.7, 0.7) if layer is None else (0.0,)
@@ -199,6 +199,20 @@ class VoxelFrontiers(FrontierMap):
         self._marks[voxel] |= EXCLUDED
         self._dropped[voxel] = self._surroundings(voxel), edges
         self._refresh(np.array([voxel]), 2 * self._radius)
+
+    def remember(self, other: VoxelFrontiers, shift: np.ndarray) -> None:
+        """Take out what another map has taken out, in whose voxel (0, 0, 0) this one has the indices `shift`.
+
+        This one is larger, and still empty. Dropped cells count again where the map has changed around them.
+        """
+
+        def numbers(voxels: np.ndarray) -> np.ndarray:
+            return np.asarray(np.ravel_multi_index(tuple((other._axes_of(voxels) + shift).T), self._size))
+
+        out = np.flatnonzero(other._marks & (EXCLUDED | DROPPED))
+        self._marks[numbers(out)] = other._marks[out] & (EXCLUDED | DROPPED)
+        for voxel, (was, edges) in other._dropped.items():
+            self._dropped[int(numbers(np.array([voxel]))[0])] = was, numbers(edges)
 
     def readmit(self) -> None:
         """See `FrontierMap`; dropped cells count again, too."""

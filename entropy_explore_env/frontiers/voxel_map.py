@@ -37,6 +37,8 @@ from entropy_explore_env.frontiers.blocks import (
 
 _KNOWN_FREE = 1
 """States above this are unmapped or covered."""
+AT_ONCE = 1 << 16
+"""Voxels whose states are updated at once."""
 _SHORT = 1e-6
 """Voxel edges by which a line ends before the face of the voxel that is looked at."""
 
@@ -49,12 +51,15 @@ def body_footprint(shape: tuple[int, int, int], body_radius: float, layer: int |
 
 @lean_kernel
 def update_voxels(states, blocks, cost, mean, precision, levels):
-    """Bring states, blocks and costs up to date with a belief; see `update_states`."""
-    changed = update_states(states, mean, precision, levels)
-    for voxel in states.changed[:changed]:
-        z = grid_index(blocks.size, voxel)[2]
-        if blocks.layer < 0 or abs(z - blocks.layer) <= blocks.reach + 2:
-            mark_around(blocks, voxel, blocks.reach + 2)
+    """Bring states, blocks and costs up to date with a belief; return how many voxels changed."""
+    changed = 0
+    for begin in range(0, len(mean), AT_ONCE):
+        count = update_states(states, mean, precision, levels, begin, min(begin + AT_ONCE, len(mean)))
+        changed += count
+        for voxel in states.changed[:count]:
+            z = grid_index(blocks.size, voxel)[2]
+            if blocks.layer < 0 or abs(z - blocks.layer) <= blocks.reach + 2:
+                mark_around(blocks, voxel, blocks.reach + 2)
     update_blocks(blocks, cost)
     return changed
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from entropy_explore_env.belief.paths.search import Search
 from entropy_explore_env.missions.proposals import Known, locate, propose_to
 from entropy_explore_env.missions.rules import Rules, rules_of
 from entropy_explore_env.missions.view import RobotView
@@ -42,6 +43,17 @@ class ViewProposer:
         self._context = np.zeros((team, described * len(CONTEXT)), np.float32)
         self._overlaps = np.zeros((team, most, most if overlaps else 0), np.float32)
         self._proposed_s = np.full(team, -1.0)
+
+    def grow(self, scenario: Scenario, shift: np.ndarray) -> None:
+        """Go on in a larger grid, in which voxel (0, 0, 0) of the one before has the indices `shift`."""
+        self._rules, self._proposers = rules_of(scenario), new_proposers(scenario)
+        for name in ("goal", "far_at", "stood_at", "edge_at", "failed"):
+            self._experience[name][..., :3] += shift
+
+    @property
+    def search(self) -> Search:
+        """Memory of its path searches, which nothing needs from one decision to the next."""
+        return self._proposers[0].scratch.search
 
     def propose(self, view: RobotView) -> np.ndarray:
         """Return the viewpoints that are proposed to a robot that decides: at the same time, always the same.

@@ -80,7 +80,7 @@ class FrontierRule(Driver):
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
         super().reset(scenario, rng)
-        self._search: Search = new_search(scenario.grid.voxels)
+        self.search: Search = new_search(scenario.grid.voxels)
         self._memories: dict[int, _Memory] = {}
         refines = self.refines and not scenario.ending.return_to_start  # all is seen, and may stay uncertain
         self._finest = min(scenario.ending.sigma_end, KNOWN_SIGMA) if refines else KNOWN_SIGMA
@@ -93,7 +93,7 @@ class FrontierRule(Driver):
         """Bring the robot's cells up to date. Its memory is made at its first choice: see `new_cells`."""
         if view.robot not in self._memories:
             cells = self.new_cells(view)
-            paths = KnownPaths(self._scenario, view.kind, cells, self._search)
+            paths = KnownPaths(self._scenario, view.kind, cells, self.search)
             self._memories[view.robot] = _Memory(cells, paths, KNOWN_SIGMA)
         memory = self._memories[view.robot]
         memory.cells.update(view, memory.level)

@@ -28,10 +28,14 @@ import math
 
 import numpy as np
 
+from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.open_tours import open_tour, tour_length
+from entropy_explore_env.frontiers.path_lengths import KnownPaths
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.planner.frontier_rule import FrontierRule
 from entropy_explore_env.planner.scene import NOWHERE, Goal, Scene, scanned_here
+from entropy_explore_env.settings.scenario import Scenario
 
 _SHORTER = 1e-6
 """A way is shorter if it is so by this many voxel edges."""
@@ -127,6 +131,25 @@ class SharedTour(Tour):
     around = 3
     """Distance in voxels, along each axis, from what the body touches in the frontier cell, within which all
     unknown voxels of the frontier have to be visible."""
+
+    def grow(self, scenario: Scenario, shift: np.ndarray) -> None:
+        """Go on in a larger grid, in which voxel (0, 0, 0) of the one before has the indices `shift`."""
+        before, after, self._scenario = self._scenario.grid.shape, scenario.grid.shape, scenario
+        self.search = new_search(scenario.grid.voxels)
+
+        def number(voxel: int) -> int:
+            if voxel < 0:  # NONE and the like
+                return voxel
+            at = np.array(np.unravel_index(voxel, before)) + shift
+            return int(np.ravel_multi_index(tuple(at), after))
+
+        for robot, memory in self._memories.items():
+            kind = scenario.kind_of(robot)
+            cells = VoxelFrontiers(scenario, kind)
+            cells.remember(memory.cells, shift)
+            memory.cells, memory.paths = cells, KnownPaths(scenario, kind, cells, self.search)
+            target, place, looked, gaze = memory.goal
+            memory.goal = Goal(number(target), number(place), looked, gaze)
 
     def pick(self, scene: Scene) -> Goal:
         """Return the voxel to go to; see `FrontierRule`."""

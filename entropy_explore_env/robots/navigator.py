@@ -60,17 +60,18 @@ def lattice_of(scenario: Scenario, robot: Robot) -> Lattice:
     return new_lattice(scenario.grid.shape, radius, scenario.layer_of(robot))
 
 
-def new_navigators(scenario: Scenario) -> dict[int, Navigator]:
+def new_navigators(scenario: Scenario, search: Search | None = None) -> dict[int, Navigator]:
     """Memory for the plans of each kind of robot that plans, by its number.
 
-    They share all arrays of the map's size, so they may not be used at the same time.
+    They share all arrays of the map's size, so they may not be used at the same time; nor may a search that
+    is lent to them.
     """
     planning = {n: kind.robot for n, kind in enumerate(scenario.kinds) if kind.robot.navigator == "planned"}
     navigators: dict[int, Navigator] = {}
     first: Navigator | None = None
     for number, robot in planning.items():
         if first is None:
-            first = navigators[number] = new_navigator(scenario, robot)
+            first = navigators[number] = new_navigator(scenario, robot, search)
         else:
             lattice, cost = lattice_of(scenario, robot), float(robot.unknown_cost)
             breaks_out = breaks_out_of(robot)
@@ -87,7 +88,7 @@ def footprints(navigators: Mapping[int, Navigator], kinds: int) -> np.ndarray:
     return padded
 
 
-def new_navigator(scenario: Scenario, robot: Robot) -> Navigator:
+def new_navigator(scenario: Scenario, robot: Robot, search: Search | None = None) -> Navigator:
     """Memory for the plans of one kind of robot.
 
     A robot that keeps a margin may believe to stand nearer to a wall than that, or in a pocket, where no path
@@ -95,7 +96,7 @@ def new_navigator(scenario: Scenario, robot: Robot) -> Navigator:
     """
     prior_precision = float(np.float32(scenario.sigma_prior**-2))
     return Navigator(
-        search=new_search(scenario.grid.voxels),
+        search=search or new_search(scenario.grid.voxels),
         lattice=lattice_of(scenario, robot),
         known_precision=KNOWN_RATIO * prior_precision,
         unknown_cost=float(robot.unknown_cost),

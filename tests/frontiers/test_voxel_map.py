@@ -17,7 +17,7 @@ from entropy_explore_env.frontiers.blocks import (
     new_blocks,
     new_states,
 )
-from entropy_explore_env.frontiers.voxel_map import body_footprint, update_voxels
+from entropy_explore_env.frontiers.voxel_map import AT_ONCE, body_footprint, update_voxels
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 
@@ -40,7 +40,7 @@ def state_of(mean, precision, levels=LEVELS):
 
 def new_voxel_map(shape, radius, layer, spacing):
     """States, blocks and traversal costs of which nothing is explored."""
-    states = new_states(shape)
+    states = new_states(shape, AT_ONCE)
     blocks = new_blocks(shape, states.state, body_footprint(shape, radius, layer), layer, spacing)
     return SimpleNamespace(
         states=states, blocks=blocks, traversal_cost=np.full(len(states.state), np.inf, np.float32)
@@ -50,6 +50,18 @@ def new_voxel_map(shape, radius, layer, spacing):
 def updated(frontiers, mean, precision, levels=LEVELS):
     maps = frontiers.states, frontiers.blocks, frontiers.traversal_cost
     return update_voxels(*maps, mean.reshape(-1), precision.reshape(-1), levels)
+
+
+def test_large_maps_are_read_part_by_part():
+    rng, shape = np.random.default_rng(0), (300, 500, 1)
+    assert np.prod(shape) > 2 * AT_ONCE
+    frontiers = new_voxel_map(shape, 1.0, 0, 4)
+    for _ in range(2):
+        mean, precision = random_map(shape, rng)
+        before = frontiers.states.state.copy()
+        changed = updated(frontiers, mean, precision)
+        assert np.array_equal(frontiers.states.state, state_of(mean, precision).reshape(-1))
+        assert changed == (frontiers.states.state != before).sum()
 
 
 @given(st.sampled_from(SHAPES), st.sampled_from([0.0, 1.0, 1.3]), st.integers(1, 4), seeds)
