@@ -1,7 +1,5 @@
 """Elevation maps read off beliefs, and completed as a dense solver of Laplace's equation completes them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -10,10 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.ndimage import distance_transform_cdt
 
-from entropy_explore_env.belief.elevation import (
-    completed,
-    elevation_map,
-)
+from entropy_explore_env.belief.elevation import completed, elevation_map
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.grid import Grid
 from tests.reference.scenes import drawn, seeds

@@ -1,7 +1,5 @@
 """Entropy of occupancy, beside the truncated normal distribution of SciPy."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

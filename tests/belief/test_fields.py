@@ -1,17 +1,11 @@
 """The entropy gradient (Rocha04, eq. 30) against the slow reference, and what known voxels leave of it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.belief.fields import (
-    entropy_gradient,
-    remaining_bits,
-    remaining_entropy_gradient,
-)
+from entropy_explore_env.belief.fields import entropy_gradient, remaining_bits, remaining_entropy_gradient
 from tests.reference import rocha04
 from tests.reference.scenes import SHAPES, as_reference, drawn, random_belief, seeds
 

@@ -1,7 +1,5 @@
 """The belief of coverage against the paper's equations in (mean, σ) form."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

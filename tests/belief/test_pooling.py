@@ -1,7 +1,5 @@
 """Sums of a pooled belief follow its voxels, whatever rays cross them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

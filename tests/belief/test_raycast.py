@@ -1,7 +1,5 @@
 """Ray traversal against the slow reference, and by hand where rounding would decide."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -191,13 +189,6 @@ def test_through_edges_and_corners_only_touched_voxels_come_extra(signs):
     assert (len(crossed) - 1) * an_edge <= len(touched) <= len(crossed) * an_edge
 
 
-def test_a_covered_voxel_at_the_start_is_left_freely():
-    cover = NOTHING.copy()
-    cover[2, 5, 2] = cover[5, 5, 2] = 1.0
-    ours, _ = cast(cover, (2.25, 5.5, 2.5), (1.0, 0.0, 0.0), behind=1)
-    assert ours == (2.75, flat_index([(x, 5, 2) for x in (2, 3, 4, 5)], SIZE), rocha04.HIT)
-
-
 def test_coverage_of_a_half_does_not_stop_a_ray():
     cover = NOTHING.copy()
     cover[4, 5, 2] = 0.5
@@ -206,8 +197,14 @@ def test_coverage_of_a_half_does_not_stop_a_ray():
     assert cast(cover, (2.25, 5.5, 2.5), (1.0, 0.0, 0.0))[0].end == rocha04.HIT
 
 
-def test_behind_a_hit_at_the_last_voxel_there_is_nothing():
+@pytest.mark.parametrize(
+    ("covered", "x", "behind", "expected"),
+    [
+        ((2, 5), 2.25, 1, (2.75, row_of_voxels(2, 3, 4, 5), rocha04.HIT)),  # it leaves its own voxel freely
+        ((6,), 4.5, 3, (1.5, row_of_voxels(4, 5, 6), rocha04.HIT)),  # nothing lies behind the last voxel
+    ],
+)
+def test_hits_of_covered_voxels_by_hand(covered, x, behind, expected):
     cover = NOTHING.copy()
-    cover[6, 5, 2] = 1.0
-    ours, _ = cast(cover, (4.5, 5.5, 2.5), (1.0, 0.0, 0.0), behind=3)
-    assert ours == (1.5, flat_index([(4, 5, 2), (5, 5, 2), (6, 5, 2)], SIZE), rocha04.HIT)
+    cover[list(covered), 5, 2] = 1.0
+    assert cast(cover, (x, 5.5, 2.5), (1.0, 0.0, 0.0), behind=behind)[0] == expected

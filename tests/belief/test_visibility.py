@@ -1,7 +1,5 @@
 """Cones of view and what they cover, against the slow reference and by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Who waits for a compiler is told once, and told when it is over."""
 
-from __future__ import annotations
-
 import logging
 import multiprocessing
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A kernel has two forms, other kernels call the inner one, and functions of others stay Numba's."""
 
-from __future__ import annotations
-
 import pickle
 
 import numba

@@ -1,7 +1,5 @@
 """Compiled kernels lie where each system keeps what can be made again, and not for ever."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

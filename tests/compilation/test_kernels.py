@@ -1,7 +1,5 @@
 """Compiled code on disk is that of the sources as a process imported them, wherever kernels are and call."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -101,24 +99,6 @@ def test_nothing_is_written_into_packages(tmp_path):
         made.chmod(mode)
         assert run(CALL.format(package=name), tmp_path, **environment) == "21.0 1"
         made.chmod(0o755)
-
-
-def test_a_kernel_of_ones_own_may_call_one_of_the_library(tmp_path):
-    made = tmp_path / "mine"
-    made.mkdir()
-    (made / "__init__.py").write_text("")
-    code = (
-        "from entropy_explore_env.belief.measurement_model import measurement_precision\n"
-        "from entropy_explore_env.compilation.kernels import kernel\n\n\n"
-        "@kernel\ndef caller(x):\n    return measurement_precision(x, 0.5, 0.0, 1.0) + {}\n"
-    )
-    call = CALL.format(package="mine")
-    (made / "caller.py").write_text(code.format("0.0"))
-    assert run(call, tmp_path) == "4.0 1"
-    library = {name for name in kernels(tmp_path) if name.startswith("entropy_explore_env.belief")}
-    (made / "caller.py").write_text(code.format("1.0"))
-    assert run(call, tmp_path) == "5.0 1"
-    assert {name for name in kernels(tmp_path) if name.startswith("entropy_explore_env.belief")} == library
 
 
 def test_a_long_run_keeps_the_code_that_it_imported(tmp_path):

@@ -1,7 +1,5 @@
 """What is kept of machine code beside itself are the names that it defines, and no others."""
 
-from __future__ import annotations
-
 import llvmlite.binding as llvm
 
 from entropy_explore_env.compilation.libraries import _names_alone

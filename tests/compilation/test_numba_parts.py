@@ -1,7 +1,5 @@
 """Numba still has the private parts that kernels build on, and they take what they are given."""
 
-from __future__ import annotations
-
 import inspect
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """A second process compiles from the other end what the first one needs, and ends with it."""
 
-from __future__ import annotations
-
 import os
 import time
 

@@ -1,7 +1,5 @@
 """Warming says what it compiled, and that nothing was left to do."""
 
-from __future__ import annotations
-
 import pytest
 from numba.core import config
 

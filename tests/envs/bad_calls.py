@@ -1,7 +1,5 @@
 """Generated bad calls of everything public: a number says which function is given which wrong value."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 from collections.abc import Callable
@@ -179,9 +177,7 @@ class Stage:
             yield Target(f"{name}.reset(options)", lambda v, reset=reset: reset(options=v), allowed)
             for option in ("starts", "world"):
                 yield Target(
-                    f"{name}.reset({option})",
-                    lambda v, reset=reset, o=option: reset(options={o: v}),
-                    Is.NONE,
+                    f"{name}.reset({option})", lambda v, reset=reset, o=option: reset(options={o: v}), Is.NONE
                 )
             for option in ("wolrd", "options"):
                 yield Target(

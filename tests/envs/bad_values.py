@@ -1,7 +1,5 @@
 """Wrong values of arguments, and where each of them would be right."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import typing

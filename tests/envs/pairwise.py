@@ -1,7 +1,5 @@
 """Covering arrays: few cases in which any two values of any two settings meet; faults of three are rare."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from typing import Any
@@ -26,10 +24,6 @@ def params(*axes: Sequence[Any]) -> list[Any]:
     """All cases for `pytest.mark.parametrize`; those that pairs do not need are marked long."""
     needed = pairwise(*axes)
     return [
-        pytest.param(
-            *case,
-            id="-".join(map(str, case)),
-            marks=() if case in needed else pytest.mark.long,
-        )
+        pytest.param(*case, id="-".join(map(str, case)), marks=() if case in needed else pytest.mark.long)
         for case in itertools.product(*axes)
     ]

@@ -1,7 +1,5 @@
 """Missions of a vector environment start anew by themselves, or by a mask, as Gymnasium says."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

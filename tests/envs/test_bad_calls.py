@@ -1,7 +1,5 @@
 """Bad calls of everything public are answered by a named error, and change nothing."""
 
-from __future__ import annotations
-
 import pytest
 
 from entropy_explore_env import EntropyExploreError

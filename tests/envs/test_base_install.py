@@ -1,7 +1,5 @@
 """The checkers of Gymnasium and PettingZoo pass with the base install, without any extra."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

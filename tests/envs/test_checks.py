@@ -1,7 +1,5 @@
 """Bad actions: each is refused with its robot's name, its value and what is allowed."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The conformance test holds for every scenario, and fails where the contract is broken."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess
@@ -14,12 +12,7 @@ import pytest
 from entropy_explore_env import SCENARIOS, SettingError
 from entropy_explore_env.command import BAD_INPUT, run_command
 from entropy_explore_env.envs import conformance
-from entropy_explore_env.envs.conformance import (
-    ConformanceError,
-    check_conformance,
-    leaves,
-    require_same,
-)
+from entropy_explore_env.envs.conformance import ConformanceError, check_conformance, leaves, require_same
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World

@@ -1,7 +1,5 @@
 """Each check of conformance finds the broken environments that it is there for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

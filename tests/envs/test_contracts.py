@@ -1,7 +1,5 @@
 """What others ask of an environment: the checkers of PettingZoo, Gymnasium and Stable-Baselines3."""
 
-from __future__ import annotations
-
 import functools
 from types import SimpleNamespace
 from typing import Any

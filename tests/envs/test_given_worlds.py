@@ -1,7 +1,5 @@
 """A World object straight into every environment, in two lines."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pettingzoo
@@ -13,14 +11,9 @@ ROOM = "entropy_explore_env/Room-v1"
 SHAPE = (9, 12, 7)
 
 
-def hut(row: int) -> eee.World:
-    """A room with a wall."""
-    solid = np.zeros(SHAPE, bool)
-    solid[row, 2:-2] = True
-    return eee.World(eee.Grid(SHAPE, 0.4), solid, f"hut {row}")
-
-
-HUT, OTHER = hut(4), hut(6)
+SOLID = np.zeros(SHAPE, bool)
+SOLID[4, 2:-2] = True
+HUT = eee.World(eee.Grid(SHAPE, 0.4), SOLID, "hut 4")
 
 
 def single() -> gymnasium.Env:
@@ -49,19 +42,6 @@ def test_the_missions_of_every_environment_are_in_the_world(make):
         assert world.name == "hut 4"
         np.testing.assert_array_equal(truth.reshape(SHAPE), HUT.occupied)
     env.close()
-
-
-def test_worlds_are_dealt_to_missions_and_to_episodes():
-    vector = eee.EntropyExploreVectorEnv("room", 4, world=[HUT, OTHER], robots=2)
-    vector.reset(seed=0)
-    assert [world.name for world in vector.missions.worlds] == ["hut 4", "hut 6", "hut 4", "hut 6"]
-    vector.reset()
-    assert [world.name for world in vector.missions.worlds] == ["hut 6", "hut 4", "hut 6", "hut 4"]
-    team = eee.parallel_env("room", world=[HUT, OTHER], robots=2)
-    team.reset(seed=0)
-    assert team.missions.worlds[0] is HUT
-    team.reset()
-    assert team.missions.worlds[0] is OTHER
 
 
 def test_the_scenario_of_a_given_world_makes_no_other_by_itself():

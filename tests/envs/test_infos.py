@@ -1,21 +1,12 @@
 """Infos say what is true, and the action mask marks the moves that make sense."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 
 import numpy as np
 import pytest
 
-from entropy_explore_env import (
-    EntropyExploreEnv,
-    MissionEnd,
-    MoveEnd,
-    RobotView,
-    SettingError,
-    parallel_env,
-)
+from entropy_explore_env import EntropyExploreEnv, MissionEnd, MoveEnd, RobotView, SettingError, parallel_env
 from entropy_explore_env.reports.metrics import mission_figures
 from tests.envs.pairwise import pairwise
 from tests.reference.scenes import SMALL

@@ -1,7 +1,5 @@
 """Covering arrays cover: every pair of values is in a case, and there are few cases."""
 
-from __future__ import annotations
-
 import itertools
 
 import pytest

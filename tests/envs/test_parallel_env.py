@@ -1,7 +1,5 @@
 """A team's environment: how it is made, how missions begin and end, rewards, state, views, pictures."""
 
-from __future__ import annotations
-
 import copy
 import math
 import pickle
@@ -17,7 +15,6 @@ from pettingzoo import AECEnv
 
 from entropy_explore_env import (
     SCENARIOS,
-    CallOrderError,
     EntropyExploreEnv,
     SettingError,
     environment_id,
@@ -138,10 +135,8 @@ def test_state_is_what_all_robots_observe(flat: bool, kind: str) -> None:
     assert team.state_space is space and team.state() is not team.state()
 
 
-def test_view_wants_a_reset_and_a_robot_of_the_team() -> None:
+def test_view_wants_a_robot_of_the_team() -> None:
     team = parallel_env(BOX)
-    with pytest.raises(CallOrderError, match="before reset"):
-        team.view("robot_0")
     team.reset(seed=0)
     for asked in (team.view, team.observation_space, team.action_space):
         with pytest.raises(SettingError, match="robot_0, robot_1"):
@@ -151,16 +146,6 @@ def test_view_wants_a_reset_and_a_robot_of_the_team() -> None:
 def test_without_any_seed_missions_differ() -> None:
     starts = {tuple(parallel_env("room").reset()[0]["robot_0"]["self"]) for _ in range(4)}
     assert len(starts) == 4
-
-
-def test_state_and_picture_want_a_reset() -> None:
-    team = parallel_env(BOX, render_mode="rgb_array")
-    with pytest.raises(CallOrderError):
-        team.deciding_agents()
-    with pytest.raises(CallOrderError):
-        team.render()
-    with pytest.raises(CallOrderError):
-        team.state()
 
 
 @pytest.mark.parametrize("scenario", SMALL)

@@ -1,7 +1,5 @@
 """What cannot be had is refused with a named error, in one line, before anything changes."""
 
-from __future__ import annotations
-
 import pickle
 from collections.abc import Mapping
 from typing import Any
@@ -15,6 +13,7 @@ from entropy_explore_env import (
     CallOrderError,
     EntropyExploreVectorEnv,
     SettingError,
+    SingleRobotEnv,
     World,
     WorldError,
     env,
@@ -75,14 +74,6 @@ def test_errors_survive_the_way_back_from_a_worker() -> None:
     assert type(again) is SettingError and str(again) == str(caught.value)
 
 
-def test_a_strategy_has_no_random_stream_before_the_first_reset() -> None:
-    team = parallel_env(BOX)
-    with pytest.raises(CallOrderError, match="strategy_generator before reset"):
-        team.strategy_generator()
-    team.reset(seed=0)
-    team.strategy_generator()
-
-
 @pytest.mark.parametrize("value", [2, "1", True, 1])
 def test_only_what_checkers_send_may_be_given_for_nothing(value: Any) -> None:
     team = parallel_env(BOX)
@@ -139,12 +130,21 @@ def test_seeds_of_rows_are_whole_numbers_one_a_mission(seeds: Any) -> None:
     RobotVecEnv(BOX, 2, seeds=np.array([3, 4]))
 
 
-@pytest.mark.parametrize("call", ["observe", "last", "state", "step"])
-def test_robots_that_act_in_turn_have_begun_before_they_are_asked(call: str) -> None:
-    turns = env(BOX)
-    given = {"observe": ("robot_0",), "step": (None,)}.get(call, ())
+@pytest.mark.parametrize(
+    ("make", "call", "given"),
+    [
+        *((parallel_env, call, ()) for call in ("deciding_agents", "render", "state", "strategy_generator")),
+        *((make, "view", ("robot_0",)) for make in (parallel_env, env)),
+        *((env, call, ()) for call in ("last", "state")),
+        (env, "observe", ("robot_0",)),
+        (env, "step", (None,)),
+        (SingleRobotEnv, "view", ()),
+        (SingleRobotEnv, "step", (np.zeros(5, np.float32),)),
+    ],
+)
+def test_calls_before_a_reset_are_refused_by_name(make: Any, call: str, given: tuple[Any, ...]) -> None:
     with pytest.raises(CallOrderError, match=f"{call} before reset"):
-        getattr(turns, call)(*given)
+        getattr(make(BOX, render_mode="rgb_array"), call)(*given)
 
 
 def test_a_margin_that_spans_millions_of_voxels_is_refused_at_once() -> None:

@@ -1,7 +1,5 @@
 """Starts and worlds given to a reset: what they lead to, in every adapter, and what is refused."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from typing import Any
@@ -9,14 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from entropy_explore_env import (
-    SettingError,
-    SingleRobotEnv,
-    World,
-    WorldError,
-    env,
-    parallel_env,
-)
+from entropy_explore_env import SettingError, SingleRobotEnv, World, WorldError, env, parallel_env
 from entropy_explore_env.envs.episodes import leaves, require_same, snapshot
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv

@@ -1,7 +1,5 @@
 """Returns of the named scenarios tell fast from slow; loggers of episodes show mission times."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

@@ -1,7 +1,5 @@
 """A reward of one's own: the figures of a step by hand, in every adapter, and what must not depend on it."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Iterator

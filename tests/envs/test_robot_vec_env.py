@@ -1,7 +1,5 @@
 """The rows of a Stable-Baselines3 VecEnv are the robots of the missions, and say what became of them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -124,22 +122,6 @@ def test_a_mapped_mission_terminates_and_one_that_ran_out_of_time_is_truncated()
     assert kinds == {10.0: True, 10_000.0: False}
 
 
-def test_busy_robots_observe_nothing_where_that_is_asked_for() -> None:
-    """And what deciding ones observe is the same."""
-    rng = np.random.default_rng(3)
-    seeing, resting = made(), made(observation=Observation(flat=True, while_busy=False))
-    first, second = seeing.reset(), resting.reset()
-    busy = 0
-    for _ in range(80):
-        deciding = seeing.deciding
-        assert (first[deciding] == second[deciding]).all() and first[deciding].any(axis=1).all()
-        assert not second[~deciding].any()
-        busy += (~deciding).sum()
-        actions = actions_of(seeing, rng)
-        first, second = seeing.step(actions)[0], resting.step(actions)[0]
-    assert busy > 20
-
-
 def test_the_last_observation_of_a_busy_robot_is_whole() -> None:
     """Its value is what a mission that is cut off goes on with."""
     rows, rng = (
@@ -152,33 +134,6 @@ def test_the_last_observation_of_a_busy_robot_is_whole() -> None:
         _, _, dones, told = rows.step(actions_of(rows, rng))
         last = [told[row]["terminal_observation"] for row in np.flatnonzero(dones)]
     assert all(each.any() for each in last)
-
-
-def test_rows_go_on_bitwise_from_arrays() -> None:
-    channel = {"delay_s": 1.5, "loss_probability": 0.4}
-    settings = {"channel": channel, "world": "furnished", "time_limit_s": 40.0, "track_truth": True}
-    settings["observation"] = Observation(flat=True, overview=True, overview_shape=(3, 4, 2))
-    first, rng = made(**settings), np.random.default_rng(5)
-    first.reset()
-    for _ in range(70):
-        first.step(actions_of(first, rng))
-    arrays = first.arrays()
-    assert all(array.dtype.hasobject is False for array in arrays.values())
-    second = made(**settings)
-    second.seed(1)
-    second.reset()
-    second.set_arrays(arrays)
-    ended = 0
-    for _ in range(70):
-        actions = actions_of(first, rng)
-        ours, theirs = first.step(actions), second.step(actions)
-        assert all(np.array_equal(a, b) for a, b in zip(ours[:3], theirs[:3], strict=True))
-        for mine, other in zip(ours[3], theirs[3], strict=True):
-            last = [info.pop("terminal_observation", np.zeros(0)) for info in (mine, other)]
-            assert np.array_equal(*last)
-            assert mine == other
-        ended += ours[2].any()
-    assert ended and first.vector_env.missions.episodes == second.vector_env.missions.episodes
 
 
 def test_seeds_are_one_a_mission() -> None:

@@ -1,7 +1,5 @@
 """Type checkers know the settings that environments take, and find the package in an editable install."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

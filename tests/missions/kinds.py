@@ -1,7 +1,5 @@
 """A scenario for all that the state of a mission may hold: what holds for every mission is tested on each."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import NamedTuple
@@ -10,6 +8,7 @@ import numpy as np
 
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import MissionState
+from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
@@ -168,3 +167,9 @@ def walked(kind: str, steps: int, seed: int = 1, missions: int = 2) -> Missions:
     these.reset_some(range(missions), range(seed, seed + missions))
     wander(these, steps, seed)
     return these
+
+
+def everything(missions: Missions) -> tuple[object, ...]:
+    """All that a step may change."""
+    digests = [state_digest(missions, mission) for mission in range(missions.count)]
+    return digests, missions.seeds, missions.episodes, missions.observations.tobytes()

@@ -1,7 +1,5 @@
 """Actions and viewpoints: what is written as an action is read back from it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Bodies neither overlap nor enter what is solid, wherever drives lead."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -14,11 +12,7 @@ from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenarios import OFFICE, ROOM_FURNISHED
 from entropy_explore_env.settings.sensor import RangeSensor
-from tests.reference.scenes import TIGHT, free_box, started, wander
-
-ENDLESS = {"sigma_end": 1e-4}
-NO_PARTS = {"panorama": False, "self_state": False, "team": False}
-
+from tests.reference.scenes import ENDLESS, NO_PARTS, TIGHT, free_box, started, wander
 
 SCANNING = with_settings(
     ROOM_FURNISHED,

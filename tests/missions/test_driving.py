@@ -1,7 +1,5 @@
 """Drives on planned paths by hand: poses and times, scans under way, what ends a drive early."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -141,25 +139,33 @@ def test_scans_under_way_are_shared_and_heard_at_their_time():
     assert robots["measurements_received"][1] == robots["measurements_sent"][0] > 0
 
 
-def test_a_wall_seen_under_way_ends_the_drive_there_and_the_robot_decides_anew():
-    missions = started(planner(sensor={**ALL_ROUND, "scan_every_m": 1.0}))
+BEYOND = (1.75, 5.25, 0.25, 0.5, 0.0)
+
+
+def before_a_wall(open_from=7, **changes):
+    """A robot that scans every metre, and does not know of the wall at y = 8 in its way to what is beyond."""
+    missions = started(planner(sensor={**ALL_ROUND, "scan_every_m": 1.0}, **changes))
     solid = np.zeros(FLAT.shape, bool)
-    solid[:6, 8] = True  # a way round at x = 6
+    solid[:open_from, 8] = True
     build(missions, solid)
     put(missions, 0, (1.75, 0.75, 0.25, 0.0, 0.0))
-    beyond = (1.75, 5.25, 0.25, 0.5, 0.0)
-    robot = toward(missions, beyond)[0]  # nothing is known: it drives straight at the wall
+    return missions
+
+
+def test_a_wall_seen_under_way_ends_the_drive_there_and_the_robot_decides_anew():
+    missions = before_a_wall(open_from=6)
+    robot = toward(missions, BEYOND)[0]  # nothing is known: it drives straight at the wall
     assert end_of(robot) is MoveEnd.SEEN
     assert missions.state.missions[0]["time_s"] == pytest.approx(2.5)
     assert robot["goal"] == pytest.approx([1.75, 1.75, 0.25, 0.5, 0.0])
-    assert robot["target"] == pytest.approx(beyond, abs=1e-6)
+    assert robot["target"] == pytest.approx(BEYOND, abs=1e-6)
     assert (robot["deciding"], robot["scans"], robot["blocked_moves"]) == (True, 1, 1)
     assert robot["distance_m"] == pytest.approx(1.0) == pytest.approx(robot["path_m"])
     assert view_of(missions, 0, 0).pose == pytest.approx(robot["goal"])
     for _ in range(8):
-        if end_of(toward(missions, beyond)[0]) is MoveEnd.ARRIVED:
+        if end_of(toward(missions, BEYOND)[0]) is MoveEnd.ARRIVED:
             break
-    assert robot["goal"] == pytest.approx(beyond, abs=1e-6)
+    assert robot["goal"] == pytest.approx(BEYOND, abs=1e-6)
     assert end_of(robot) is MoveEnd.ARRIVED
 
 
@@ -182,29 +188,19 @@ def test_a_drive_counts_as_blocked_that_ends_before_what_is_not_there():
 
 def test_the_end_of_a_path_counts_though_an_unseen_wall_ends_the_drive_before():
     """The wall is where the plan leads, not where the drive would stop."""
-    missions = started(planner(sensor={**ALL_ROUND, "scan_every_m": 1.0}))
-    solid = np.zeros(FLAT.shape, bool)
-    solid[:, 8] = True
-    build(missions, solid)
-    put(missions, 0, (1.75, 0.75, 0.25, 0.0, 0.0))
-    beyond = (1.75, 5.25, 0.25, 0.5, 0.0)
-    assert end_of(toward(missions, beyond)[0]) is MoveEnd.SEEN
-    robot = toward(missions, beyond)[0]  # now it knows that there is no path: up to the wall
+    missions = before_a_wall()
+    assert end_of(toward(missions, BEYOND)[0]) is MoveEnd.SEEN
+    robot = toward(missions, BEYOND)[0]  # now it knows that there is no path: up to the wall
     assert end_of(robot) is MoveEnd.NO_PATH
     assert robot["goal"][:3] == pytest.approx([1.75, 3.75, 0.25])
     assert robot["blocked_moves"] == 2
-    robot = toward(missions, beyond)[0]  # nearer it cannot get
+    robot = toward(missions, BEYOND)[0]  # nearer it cannot get
     assert (end_of(robot), robot["path_m"]) == (MoveEnd.NO_PATH, 0.0)
     assert robot["goal"] == pytest.approx([1.75, 3.75, 0.25, 0.5, 0.0])
 
 
 def test_who_drives_straight_does_not_look_ahead():
-    missions = started(planner(sensor={**ALL_ROUND, "scan_every_m": 1.0}, robot={"navigator": "straight"}))
-    solid = np.zeros(FLAT.shape, bool)
-    solid[:, 8] = True
-    build(missions, solid)
-    put(missions, 0, (1.75, 0.75, 0.25, 0.0, 0.0))
-    robot = toward(missions, (1.75, 5.25, 0.25, 0.5, 0.0))[0]
+    robot = toward(before_a_wall(robot={"navigator": "straight"}), BEYOND)[0]
     assert (end_of(robot), robot["scans"]) == (MoveEnd.OBSTACLE, 3)
     assert robot["goal"][1] == pytest.approx(3.75)
 

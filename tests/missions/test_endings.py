@@ -1,7 +1,5 @@
 """What ends a mission: one map, all of them, what the team shares, what it has seen, time or cycles."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

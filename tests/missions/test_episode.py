@@ -1,7 +1,5 @@
 """What a mission starts with: maps at the prior, the entropies that are to be reached, nothing of before."""
 
-from __future__ import annotations
-
 import pytest
 
 from entropy_explore_env.belief.entropy import map_entropy_bits

@@ -1,7 +1,5 @@
 """Which event of a mission is next, and that each is used up, so that no step lasts for ever."""
 
-from __future__ import annotations
-
 import math
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """Missions end where nothing is left that a robot could drive up to."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

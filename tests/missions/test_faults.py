@@ -1,7 +1,5 @@
 """Missions in which robots stop, sensors and radios fail: by hand, drawn, copied, batched, without end."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Landmarks of the world: which are sighted, what that takes back, where they are drawn, what is refused."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -58,8 +56,7 @@ def test_a_gaze_straight_down_sights_what_is_ahead_below_and_behind():
     ):
         missions = frozen(
             free_box(
-                robot={"turn_rate_rad_s": math.inf, "localization": SOME},
-                fiducials={"positions_m": (place,)},
+                robot={"turn_rate_rad_s": math.inf, "localization": SOME}, fiducials={"positions_m": (place,)}
             )
         )
         put(missions, 0, (*STAY[:3], math.pi / 2, math.pi / 2))

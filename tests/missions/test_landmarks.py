@@ -1,7 +1,5 @@
 """Landmarks of robots' own maps in missions: which are chosen, what they take back, kept, refused."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Missions in which robots drift: by hand, beside exact ones, in teams, copied, batched, drawn, refused."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

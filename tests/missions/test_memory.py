@@ -1,7 +1,5 @@
 """The memory that missions need, estimated beforehand, against what they really allocate."""
 
-from __future__ import annotations
-
 import gc
 import os
 import time

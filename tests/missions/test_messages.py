@@ -1,7 +1,5 @@
 """Which messages arrive: through what stands between two robots, and how far."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Teams of several kinds of robots: each robot moves and senses as in a team of its own kind."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import pickle

@@ -1,7 +1,5 @@
 """Teams that plan: bodies never overlap, and neither threads, batches nor pickling change what they do."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 

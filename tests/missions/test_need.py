@@ -1,7 +1,5 @@
 """Sharing by need: what is sent first, that it fits the burst, and that nothing is fused twice."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,7 +8,7 @@ from entropy_explore_env.belief.entropy import map_entropy_bits
 from entropy_explore_env.missions.backlog import TeamBacklog
 from entropy_explore_env.missions.messages import Team, Tracer, unpack_measurements
 from entropy_explore_env.missions.need import choose_needed, share_lacking
-from tests.reference.scenes import drawn, free_box, seeds, started, wander
+from tests.reference.scenes import drawn, free_box, robots_of, seeds, started, wander
 
 QUIET = {"announcements": False, "i_min_bits": 0.0}
 NEED = {**QUIET, "order": "need"}
@@ -22,10 +20,6 @@ def played(steps=60, seed=3, robots=3, changes=UNENDING, **channel):
     missions = started(free_box(robots=robots, channel={**NEED, **channel}, **changes))
     wander(missions, steps, seed)
     return missions
-
-
-def robots_of(missions, field):
-    return missions.state.robots[0][field]
 
 
 def team_of(missions):

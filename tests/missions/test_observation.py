@@ -1,7 +1,5 @@
 """Every part of an observation against slow NumPy, from the state after steps of random actions."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,11 +1,9 @@
 """The broadcast in phases: when batches go out, what they cost, and that each is fused once."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from entropy_explore_env.belief.entropy import map_entropy_bits
-from tests.reference.scenes import free_box, started, wander
+from tests.reference.scenes import free_box, robots_of, started, wander
 
 NO_ANNOUNCEMENTS = {"announcements": False, "i_min_bits": 0.0}
 
@@ -15,10 +13,6 @@ def played(steps=60, seed=3, **channel):
     missions = started(scenario)
     wander(missions, steps, seed)
     return missions
-
-
-def robots_of(missions, field):
-    return missions.state.robots[0][field]
 
 
 def test_nothing_is_heard_before_the_first_phase_ends():

@@ -1,7 +1,5 @@
 """Where robots are on their drives, how fast, and what is left of them, by hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Critics get what all robots' maps hold together, and nothing that acts does."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import grimp
@@ -12,40 +10,24 @@ from entropy_explore_env.envs.privileged_vec_env import PrivilegedVecEnv
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.privileged import PRIVILEGED, privileged_numbers
-from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario
-from entropy_explore_env.settings.scenarios import find_scenario
+from tests.reference.scenes import free_box, started, wander
 
 COLUMN = {number.name: place for place, number in enumerate(PRIVILEGED)}
 
 
-def scenario(**changes: Any) -> Scenario:
-    changed = {"robots": 2, "channel": {"loss_probability": 0.3}, "decision_period_s": None, **changes}
-    return with_settings(find_scenario("box-7x11x5"), changed)
-
-
-def missions(there: Scenario, count: int, first: int = 0) -> Missions:
-    made = Missions(there, count)
-    made.reset_some(range(count), range(first, first + count))
-    return made
-
-
-def advance(these: Missions, rng: np.random.Generator, steps: int) -> None:
-    """Random actions, the same in every mission."""
-    for _ in range(steps):
-        action = np.tile(rng.uniform(-1, 1, (1, these.scenario.robots, 5)), (these.count, 1, 1))
-        these.step(action, np.zeros((these.count, these.scenario.robots), np.int64))
+def team(**changes: Any) -> Scenario:
+    return free_box(channel={"loss_probability": 0.3}, **changes)
 
 
 def test_numbers_of_critics_by_hand():
     """The joint map knows each voxel as well as the robot that knows it best: no map knows more."""
-    these = missions(scenario(robots=3), 2)
+    these = started(team(robots=3), missions=2)
     start = privileged_numbers(these)
     assert start.shape == (2, 3, len(PRIVILEGED))
     assert np.allclose(start[:, :, :4], 1.0, atol=1e-6) and np.allclose(start[:, :, 4], 0.0, atol=1e-6)
     assert np.allclose(start[:, :, COLUMN["next_decision"]], 0.0)
-    advance(these, np.random.default_rng(0), 9)
+    wander(these, 9, 0)
     numbers, clock = privileged_numbers(these), these.state.missions
     asked = clock["entropy_start_bits"] - clock["entropy_end_bits"]
     prior = these.rules.params["prior_precision"][0]
@@ -61,8 +43,8 @@ def test_numbers_of_critics_by_hand():
 
 
 def test_teammates_are_as_near_as_they_are_and_decide_when_they_do():
-    these = missions(scenario(robots=3, decision_period_s=0.05), 1)
-    advance(these, np.random.default_rng(0), 1)
+    these = started(team(robots=3, decision_period_s=0.05))
+    wander(these, 1, 0)
     robots, time_s = these.state.robots[0], these.state.missions["time_s"][0]
     robots["origin"][:, :3] = robots["goal"][:, :3] = [[0.1, 0, 0], [0.4, 0, 0], [0.1, 0.4, 0]]
     robots["deciding"], robots["redecide_s"] = [False, False, True], np.inf
@@ -71,12 +53,12 @@ def test_teammates_are_as_near_as_they_are_and_decide_when_they_do():
     diagonal = np.linalg.norm(these.grid.size_m)
     assert np.allclose(numbers[:, COLUMN["nearest_mate"]], np.array([0.3, 0.3, 0.4]) / diagonal, atol=1e-5)
     assert np.allclose(numbers[:, COLUMN["next_decision"]], [0.0, 0.0, 2.0 / 12.0], atol=1e-5)
-    alone = privileged_numbers(missions(scenario(robots=1), 1))[0, 0]
+    alone = privileged_numbers(started(team(robots=1)))[0, 0]
     assert alone[COLUMN["nearest_mate"]] == alone[COLUMN["next_decision"]] == 1.0
 
 
 def test_rows_for_training_are_observations_and_then_what_no_robot_knows():
-    there = scenario(observation={"flat": True}, ending={"time_limit_s": 12.0}, decision_period_s=2.0)
+    there = team(observation={"flat": True}, ending={"time_limit_s": 12.0}, decision_period_s=2.0)
     plain, told = RobotVecEnv(there, 2, seeds=[1, 2]), PrivilegedVecEnv(there, 2, seeds=[1, 2])
     ours, theirs, size = told.reset(), plain.reset(), plain.vector_env.missions.layout.size
     assert told.observation_space.shape == (size + len(PRIVILEGED),)
@@ -101,7 +83,7 @@ def test_rows_for_training_are_observations_and_then_what_no_robot_knows():
 
 def test_privileged_rows_must_be_flat():
     with pytest.raises(SettingError, match="flat"):
-        PrivilegedVecEnv(scenario(), 1)
+        PrivilegedVecEnv(team(), 1)
 
 
 def test_nobody_who_acts_or_evaluates_can_see_what_only_training_may():

@@ -1,7 +1,5 @@
 """Decisions under way by hand and on random drives: what they cost, what they leave as it was."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -11,15 +9,7 @@ from entropy_explore_env.missions.poses import driven_metres, pose_at, speed_at
 from entropy_explore_env.missions.redecision import CHOICE, braking_metres, keeps_speed, keeps_target
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
-from tests.missions.test_driving import (
-    ALL_ROUND,
-    BEHIND,
-    LEG,
-    at_the_wall,
-    end_of,
-    planner,
-    wall_with_a_gap,
-)
+from tests.missions.test_driving import ALL_ROUND, BEHIND, LEG, at_the_wall, end_of, planner, wall_with_a_gap
 from tests.reference.scenes import build, free_box, put, started, toward
 
 START = (0.75, 0.75, 0.25, 0.0, 0.0)

@@ -1,7 +1,5 @@
 """Robots that change their mind while they drive keep to their limits, and out of walls and bodies."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Missions that end when all is seen and the team is home."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Figures that are carried along equal those of the whole map, and nobody acts on them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

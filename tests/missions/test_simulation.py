@@ -1,7 +1,5 @@
 """Whole missions: against the slow reference, and what must hold in every step of any mission."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import pickle
@@ -20,11 +18,7 @@ from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import ROOM
 from tests.reference import rocha04
-from tests.reference.scenes import as_arrays, free_box, random_actions, started, wander
-
-ENDLESS = {"sigma_end": 1e-4}
-NO_PARTS = {"panorama": False, "self_state": False, "team": False}
-
+from tests.reference.scenes import ENDLESS, NO_PARTS, as_arrays, free_box, random_actions, started, wander
 
 # --- A mission of the reference
 

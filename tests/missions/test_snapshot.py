@@ -1,7 +1,5 @@
 """Missions of every kind go on bit for bit: in batches, on threads, copied, pickled, restored, run again."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 
@@ -21,13 +19,8 @@ from entropy_explore_env.reports.mission_record import (
 )
 from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.worlds.load import save_world
-from tests.missions.kinds import KINDS, walked
+from tests.missions.kinds import KINDS, everything, walked
 from tests.reference.scenes import free_box, random_actions, started, wander
-
-
-def everything(missions):
-    digests = [state_digest(missions, mission) for mission in range(missions.count)]
-    return digests, missions.seeds, missions.episodes, missions.observations.tobytes()
 
 
 @pytest.mark.parametrize("kind", KINDS)

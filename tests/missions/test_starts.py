@@ -1,7 +1,5 @@
 """Where robots start: in voxel centres with room, apart from each other, near the first one if asked."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -9,9 +7,7 @@ import pytest
 
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.missions.simulation import Missions
-from tests.reference.scenes import TIGHT, free_box, started
-
-NO_PARTS = {"panorama": False, "self_state": False, "team": False}
+from tests.reference.scenes import NO_PARTS, TIGHT, free_box, started
 
 
 def test_starts_are_voxel_centres_with_room_apart_from_each_other():

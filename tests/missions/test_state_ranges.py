@@ -1,7 +1,5 @@
 """Saved states with numbers that no mission can hold: refused by name, and nothing changes."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import functools
@@ -15,8 +13,7 @@ from entropy_explore_env.errors import EntropyExploreError, RecordError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.state_ranges import check_ranges
-from entropy_explore_env.reports.state_digest import state_digest
-from tests.missions.kinds import walked
+from tests.missions.kinds import everything, walked
 from tests.reference.scenes import free_box, started
 
 LATE, ALL = "late messages", "everything at once"
@@ -142,11 +139,6 @@ CASES = [
     for place, values in places.items()
     for value in values
 ]
-
-
-def everything(missions):
-    digests = [state_digest(missions, mission) for mission in range(2)]
-    return digests, missions.seeds, missions.episodes, missions.observations.tobytes()
 
 
 @functools.cache

@@ -1,7 +1,5 @@
 """Random draws: their numbers, and that every kind of draw has a stream of its own."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

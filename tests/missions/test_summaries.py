@@ -1,7 +1,5 @@
 """Maps shared as summaries: when, what, how many bits, and that nothing comes twice."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -15,7 +13,7 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.summaries import precision_of_place
 from entropy_explore_env.robots.localization import pack_covariance
 from entropy_explore_env.robots.map_summary import decode_map, encode_map, is_summary
-from tests.reference.scenes import drawn, free_box, random_actions, seeds, started, wander
+from tests.reference.scenes import drawn, free_box, random_actions, robots_of, seeds, started, wander
 
 QUIET = {"announcements": False}
 SUMMARIES = {"content": "summaries", "summary_every_s": 2.0}
@@ -35,10 +33,6 @@ def played(steps=60, seed=1, count=1, threads=1, **changes):
     missions.reset_some(range(count), [seed + mission for mission in range(count)])
     wander(missions, steps, seed)
     return missions
-
-
-def robots_of(missions, field):
-    return missions.state.robots[0][field]
 
 
 def fused(missions, robot, said):

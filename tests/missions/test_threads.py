@@ -1,7 +1,5 @@
 """Threads that share missions: errors pass on, a closed pool begins anew, and a forked child has its own."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

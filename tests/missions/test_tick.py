@@ -1,7 +1,5 @@
 """One step by hand: driving, messages on their way, bodies in the way, actions that are ignored."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

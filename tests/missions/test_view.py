@@ -1,7 +1,5 @@
 """What a robot's view shows, and that nothing can be changed through it."""
 
-from __future__ import annotations
-
 import math
 import pickle
 

@@ -1,7 +1,5 @@
 """What a policy observes from a RobotView is what the environment shows it, and its actions mean the same."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

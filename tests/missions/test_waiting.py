@@ -1,7 +1,5 @@
 """Robots whose path a teammate blocks: they decide anew at once, or stand still first; and what they send."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -13,12 +11,7 @@ from tests.reference import rocha04
 from tests.reference.scenes import build, free_box, standing, started, toward, wander
 
 HERE, FAR, STAY = (1.75, 2.75, 1.25, 0.0, 0.0), (1.75, 3.7, 1.25, 0.0, 0.0), (1.75, 3.75, 1.25, 0.0, 0.0)
-WAITS = {
-    "when_blocked": "wait",
-    "blocked_wait_s": 2.0,
-    "turn_rate_rad_s": math.inf,
-    "body_radius_m": 0.25,
-}
+WAITS = {"when_blocked": "wait", "blocked_wait_s": 2.0, "turn_rate_rad_s": math.inf, "body_radius_m": 0.25}
 
 
 def behind_a_teammate(**changes):

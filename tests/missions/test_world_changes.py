@@ -1,7 +1,5 @@
 """Worlds that change under way."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -92,11 +92,15 @@ def free_box(**changes: Any) -> Scenario:
     return with_settings(BOX, {"decision_period_s": None, **changes})
 
 
+ENDLESS = {"sigma_end": 1e-4}
+"""Endings of missions that no map is known well enough for."""
+NO_PARTS = {"panorama": False, "self_state": False, "team": False}
+"""Observations without any part."""
 TIGHT = free_box(
     robots=5,
     robot={"body_radius_m": 0.35, "reach_m": 3.0},
     decision_period_s=0.6,
-    observation={"panorama": False, "self_state": False, "team": False},
+    observation=NO_PARTS,
 )
 """Five large bodies in a small box."""
 
@@ -107,6 +111,11 @@ def started(scenario: Scenario, seed: int = 0, missions: int = 1) -> Missions:
     for mission in range(missions):
         these.reset(mission, seed + mission)
     return these
+
+
+def robots_of(missions: Missions, field: str) -> np.ndarray:
+    """A field of the first mission's robots, (A, …)."""
+    return missions.state.robots[0][field]
 
 
 def standing(*poses: Any, **changes: Any) -> Missions:

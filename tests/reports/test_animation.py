@@ -1,7 +1,5 @@
 """Films that thin themselves out, animations and videos read back, and the window that shows them."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -37,10 +35,7 @@ def filmed(times_s: list[float], most: int) -> list[float]:
 
 
 @drawn(60)
-@given(
-    gaps=st.lists(st.floats(0.2, 7.0), min_size=1, max_size=250),
-    most=st.integers(2, 40),
-)
+@given(gaps=st.lists(st.floats(0.2, 7.0), min_size=1, max_size=250), most=st.integers(2, 40))
 def test_a_film_keeps_both_ends_and_spreads_the_rest(gaps, most):
     times = np.cumsum([0.0, *gaps]).tolist()
     kept = filmed(times, most)

@@ -1,7 +1,5 @@
 """Figures of a mission against the arrays that they are read from."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """From missions to pictures: what is shown, of which moment, and that nothing is done unasked."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -10,11 +8,7 @@ import pytest
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports import painting
-from entropy_explore_env.reports.painting import (
-    Painter,
-    entropy_share,
-    remaining_share,
-)
+from entropy_explore_env.reports.painting import Painter, entropy_share, remaining_share
 from entropy_explore_env.reports.recording import poses_now
 from entropy_explore_env.reports.rendering import Frame, draw_frame
 from entropy_explore_env.settings.grid import Grid

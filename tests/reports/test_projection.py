@@ -1,7 +1,5 @@
 """Beliefs seen from above and from the side, against sums written out."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A mission's time series."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

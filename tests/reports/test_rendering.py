@@ -1,7 +1,5 @@
 """Pictures of missions: what lies where, on worlds with no two edges equal."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -11,13 +9,7 @@ from PIL import Image, ImageDraw
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.reports import annotations
 from entropy_explore_env.reports.annotations import Box, Mark, draw_legend, legend_rows
-from entropy_explore_env.reports.colours import (
-    COLOURS,
-    INK,
-    PAPER,
-    ROBOT_COLOURS,
-    UNKNOWN_COLOUR,
-)
+from entropy_explore_env.reports.colours import COLOURS, INK, PAPER, ROBOT_COLOURS, UNKNOWN_COLOUR
 from entropy_explore_env.reports.page_layout import View, lay_out
 from entropy_explore_env.reports.rendering import Frame, draw_frame
 

@@ -1,7 +1,5 @@
 """Recordings for Rerun, read back with its own reader and held against the mission."""
 
-from __future__ import annotations
-
 import math
 import sys
 from itertools import pairwise

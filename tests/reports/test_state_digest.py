@@ -1,7 +1,5 @@
 """The digest of a mission's state sees all of it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

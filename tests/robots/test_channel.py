@@ -1,7 +1,5 @@
 """What a robot sends (Rocha04, eq. 43), and whether it arrives."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -44,12 +42,7 @@ def test_the_selection_fulfils_equation_43_and_is_that_of_the_reference(utility,
 
 
 @drawn(80)
-@given(
-    utilities,
-    st.integers(1, 45),
-    st.floats(1e-6, 5.0),
-    st.floats(0.01, 1.0),
-)
+@given(utilities, st.integers(1, 45), st.floats(1e-6, 5.0), st.floats(0.01, 1.0))
 def test_i_min_is_steered_like_the_reference(utility, burst, i_min, fill):
     steered = steered_i_min(i_min, np.asarray(utility, np.float64), burst, fill)
     assert steered == pytest.approx(rocha04.steered(i_min, utility, burst, fill, 0.1), rel=1e-12)

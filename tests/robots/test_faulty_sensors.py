@@ -1,7 +1,5 @@
 """Scans that a faulty sensor spoils, by hand: lost rays, distances that are measured wrong."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

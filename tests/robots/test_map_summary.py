@@ -1,7 +1,5 @@
 """Summaries of maps: what comes back, how much more than nothing, and what is refused."""
 
-from __future__ import annotations
-
 import math
 import zlib
 

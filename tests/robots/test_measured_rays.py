@@ -1,7 +1,5 @@
 """Rays that are walked two at a time cross the voxels that each of them crosses alone."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

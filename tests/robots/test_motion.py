@@ -1,7 +1,5 @@
 """Driving from rest to rest, and what stops a drive."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The navigator: waypoints through a belief by hand, and that planned drives meet nothing that is known."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -12,10 +10,7 @@ from hypothesis import strategies as st
 from scipy import ndimage
 
 from entropy_explore_env.belief.paths.lattice import NO_FLY_NOWHERE
-from entropy_explore_env.robots.motion import (
-    MoveEnd,
-    line_believed_blocked,
-)
+from entropy_explore_env.robots.motion import MoveEnd, line_believed_blocked
 from entropy_explore_env.robots.navigator import lattice_of, new_navigator, plan_path
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World

@@ -1,7 +1,5 @@
 """Landmarks of a robot's own map: eq. 17, and what sighting them again says, beside slow references."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Estimates of poses: drift, sightings and uncertain measurements, by hand and beside a slow reference."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

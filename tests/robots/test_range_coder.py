@@ -1,7 +1,5 @@
 """The range coder: what is written is read again, and takes as many bits as its decisions are surprising."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

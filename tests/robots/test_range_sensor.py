@@ -1,7 +1,5 @@
 """The range sensor: its bundle of rays, what comes back along them, and what that says of voxels."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -53,14 +51,6 @@ def directions_of(sensor, yaw, pitch):
 
 def voxels_on(scan, index):
     return scan.crossed[index, : scan.rays[index]["voxels"]].tolist()
-
-
-def test_the_paper_s_field_of_view_is_16_by_8_rays():
-    sensor = RangeSensor()
-    assert (sensor.columns, sensor.rows, sensor.rays) == (16, 8, 128)
-    model = sensor_model(sensor)
-    assert model.yaw_offsets == pytest.approx((np.arange(16) - 7.5) * math.pi / 90)
-    assert model.pitch_offsets == pytest.approx((np.arange(8) - 3.5) * math.pi / 90)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Rotations agree with each other, and with quarter turns by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a refused setting must say."""
 
-from __future__ import annotations
-
 import pytest
 
 from entropy_explore_env.errors import EntropyExploreError, SettingError

@@ -1,7 +1,5 @@
 """Scenarios with some settings changed: what is nested, short or unknown."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

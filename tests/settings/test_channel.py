@@ -1,7 +1,5 @@
 """Settings of the channel that do nothing where they are given are refused, and errors say what to write."""
 
-from __future__ import annotations
-
 import pytest
 
 from entropy_explore_env.errors import SettingError
@@ -49,11 +47,7 @@ def test_settings_that_have_an_effect_are_allowed():
     [
         ({"channel": "summaries"}, "Scenario.channel", "a mapping of its fields: {'content': 'summaries'}"),
         ({"channel": "line_of_sight"}, "Scenario.channel", "fields: {'reach': 'line_of_sight'}"),
-        (
-            {"channel": "loud"},
-            "Scenario.channel",
-            "summary_every_s, summary_threshold_bits, …",
-        ),
+        ({"channel": "loud"}, "Scenario.channel", "summary_every_s, summary_threshold_bits, …"),
         (
             {"robot": {"localization": 0.1}},
             "Robot.localization",

@@ -1,7 +1,5 @@
 """Settings of faults and signals: what is allowed, that they go through JSON, and that teams fit them."""
 
-from __future__ import annotations
-
 import pytest
 
 from entropy_explore_env.errors import SettingError

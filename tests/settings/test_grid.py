@@ -1,7 +1,5 @@
 """Points and voxels of a workspace."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from entropy_explore_env.settings.grid import Grid

@@ -1,7 +1,5 @@
 """Settings as JSON: what comes back is what was written, to the last bit."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

@@ -1,7 +1,5 @@
 """The scenarios that are too large for whole episodes: each is made by its id, starts and steps."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

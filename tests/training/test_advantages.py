@@ -1,7 +1,5 @@
 """Advantages of decisions, against a plain walk through each robot's steps, and running means."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """The network over candidates: it begins as the planner and never chooses what does not exist."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

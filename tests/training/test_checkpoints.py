@@ -1,7 +1,6 @@
 """Checkpoints come back as they were; what is broken, foreign or made for something else is named."""
 
-from __future__ import annotations
-
+import hashlib
 import json
 import pickle
 import shutil
@@ -153,16 +152,21 @@ def test_weights_that_do_not_fit_are_named(tmp_path, what):
         load_policy(load_checkpoint(tmp_path / "step-1"))
 
 
-def test_loading_runs_no_code(saved):
-    """An array of objects, which NumPy would unpickle, is refused even if its digest is right."""
-    import hashlib
-
-    array = np.array([{"any": "object"}], dtype=object)
-    np.savez(saved / "normalisation.npz", observations_mean=array)
-    head = json.loads((saved / "policy.json").read_text())
-    content = (saved / "normalisation.npz").read_bytes()
+def renormalised(saved, save, array):
+    """Put another array into a checkpoint, with its digest; the file's content."""
+    save(saved / "normalisation.npz", observations_mean=array)
+    head, content = (
+        json.loads((saved / "policy.json").read_text()),
+        (saved / "normalisation.npz").read_bytes(),
+    )
     head["sha256"]["normalisation.npz"] = hashlib.sha256(content).hexdigest()
     (saved / "policy.json").write_text(json.dumps(head))
+    return content
+
+
+def test_loading_runs_no_code(saved):
+    """An array of objects, which NumPy would unpickle, is refused even if its digest is right."""
+    renormalised(saved, np.savez, np.array([{"any": "object"}], dtype=object))
     with pytest.raises(CheckpointError, match="without objects"):
         load_checkpoint(saved)
     save_file({"a": torch.zeros(1)}, saved / "policy.safetensors")
@@ -172,14 +176,7 @@ def test_loading_runs_no_code(saved):
 
 def test_arrays_that_would_grow_while_they_are_read_are_refused(saved):
     """A hundred MiB of zeros in a hundred KiB, with the right digest."""
-    import hashlib
-
-    np.savez_compressed(saved / "normalisation.npz", observations_mean=np.zeros(13_000_000))
-    content = (saved / "normalisation.npz").read_bytes()
-    assert len(content) < 200_000
-    head = json.loads((saved / "policy.json").read_text())
-    head["sha256"]["normalisation.npz"] = hashlib.sha256(content).hexdigest()
-    (saved / "policy.json").write_text(json.dumps(head))
+    assert len(renormalised(saved, np.savez_compressed, np.zeros(13_000_000))) < 200_000
     with pytest.raises(CheckpointError, match="its arrays are compressed"):
         load_checkpoint(saved)
 

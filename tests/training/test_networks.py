@@ -1,7 +1,5 @@
 """What networks see of observations, that gazes are scored alike, and the distribution of moves and gazes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

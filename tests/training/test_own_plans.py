@@ -1,7 +1,5 @@
 """Plans of one's own: a list to learn in, others to validate and to test in, from the command line."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -1,7 +1,5 @@
 """training.ppo from start to end, killed and resumed, and its errors."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import io

@@ -1,7 +1,5 @@
 """PPO over candidates: it begins as the planner, learns, and resumes bitwise."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import io

@@ -1,7 +1,5 @@
 """What RLlib's trainer says to bad input, and what it keeps: none of this needs RLlib."""
 
-from __future__ import annotations
-
 import errno
 import math
 import sys

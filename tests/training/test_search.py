@@ -1,7 +1,5 @@
 """The search of weights by pairs of missions: what it estimates, that it repeats, goes on, and refuses."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Costs of paths on small grids: as a graph of steps, drawn at random, and as searches find them."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """Geodesic Voronoi cells against a slow Dijkstra, by hand, and by what must hold of any cells."""
 
-from __future__ import annotations
-
 import heapq
 import itertools
 import math

@@ -1,7 +1,5 @@
 """Lengths in a layer by canonical paths: beside SciPy's Dijkstra and the general search, and by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

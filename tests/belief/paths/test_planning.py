@@ -1,7 +1,5 @@
 """Shortest paths against SciPy's Dijkstra on an explicit graph, and by hand."""
 
-from __future__ import annotations
-
 import itertools
 import math
 
@@ -12,12 +10,7 @@ from hypothesis import strategies as st
 from scipy.sparse.csgraph import dijkstra
 
 from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, belief_costs, new_lattice
-from entropy_explore_env.belief.paths.planning import (
-    ANY_GOAL,
-    resume_search,
-    search_paths,
-    start_search,
-)
+from entropy_explore_env.belief.paths.planning import ANY_GOAL, resume_search, search_paths, start_search
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.grid import Grid

@@ -1,7 +1,5 @@
 """Lines of sight against dense sampling; string-pulled paths are free and never cost more."""
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,8 +1,6 @@
 """The adapter for RLlib: who is heard when, what is learned from, how episodes end, and who shares a seed."""
 # pyright: reportMissingImports=false
 
-from __future__ import annotations
-
 from collections import defaultdict
 from typing import Any
 
@@ -18,11 +16,7 @@ from ray.rllib.algorithms.ppo import PPOConfig
 from ray.rllib.env.env_context import EnvContext
 from ray.rllib.env.multi_agent_env_runner import MultiAgentEnvRunner
 
-from entropy_explore_env.envs.rllib_env import (
-    EntropyExploreMultiAgentEnv,
-    endings,
-    runner_seed,
-)
+from entropy_explore_env.envs.rllib_env import EntropyExploreMultiAgentEnv, endings, runner_seed
 
 pytestmark = [  # RLlib's own
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),

@@ -1,7 +1,5 @@
 """The tutorial's example with RLlib trains."""
 
-from __future__ import annotations
-
 import runpy
 import sys
 from pathlib import Path

@@ -1,8 +1,6 @@
 """RLlib's trainer end to end: two runners on this machine, resumed; and nobody at the address."""
 # pyright: reportMissingImports=false
 
-from __future__ import annotations
-
 import csv
 import os
 import re
