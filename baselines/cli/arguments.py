@@ -1,7 +1,7 @@
 """The form of the commands here: arguments from a dataclass, results out, progress and errors aside.
 
 Results go to standard output (with `--json` exactly one JSON object), progress to standard error. Exit codes
-are those of `entropy_explore_env.command`; 1: a claim or goal does not hold where `--strict` asked.
+are those of `entropy_explore_env.command`.
 """
 
 from __future__ import annotations

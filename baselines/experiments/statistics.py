@@ -41,10 +41,6 @@ class Interval(NamedTuple):
         value, low, high = (format(number, form or ".4g") for number in self)
         return f"{value} ({low} … {high})"
 
-    def text(self, form: str = ".2f") -> str:
-        """Return the same with two digits behind the point."""
-        return format(self, form)
-
 
 def mean_interval(values: Sample) -> Interval:
     """Return the mean and its interval."""

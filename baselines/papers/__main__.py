@@ -22,7 +22,7 @@ from entropy_explore_env.errors import SettingError, one_of
 if TYPE_CHECKING:
     from baselines.experiments.experiment import Experiment
 
-_NOT_TOLD = ("--out", "--runs", "--jobs", "--cluster", "--json", "--strict", "--rerun", "--since")
+_NOT_TOLD = ("--out", "--runs", "--jobs", "--cluster", "--json", "--rerun", "--since")
 """Options that a page does not tell."""
 
 
@@ -43,8 +43,6 @@ class Args(TrialOptions):
     """Folder that keeps the rows."""
     json: bool = False
     """Print one JSON object and nothing else."""
-    strict: bool = False
-    """Exit with 1 if a claim does not hold."""
 
 
 def main(words: Sequence[str]) -> int:
@@ -63,18 +61,17 @@ def main(words: Sequence[str]) -> int:
 
     options = [word for word in words if word != args.paper]
     command = told_command(f"python -m baselines.papers {args.paper}", options, _NOT_TOLD)
-    failed, found = False, {}
+    found = {}
     for experiment, amount in zip(experiments, amounts, strict=True):
         table, started = args.runs / f"{experiment.name}.jsonl", time.perf_counter()
         claims = reproduce(experiment, amount, table, how, args.out, command)
         wall_s = round(time.perf_counter() - started, 1)
         found[experiment.name] = {"claims": [claim.row() for claim in claims], "wall_s": wall_s}
-        failed = failed or not all(claim.holds for claim in claims)
         if not args.json:
             print(f"{experiment.title}\n{terminal_claims(claims)}\n")
     if args.json:
         print_json({"paper": args.paper, "experiments": found})
-    return 1 if args.strict and failed else 0
+    return 0
 
 
 def find_experiment(name: str) -> Experiment:

@@ -63,7 +63,7 @@ def scoreboard_times(scenario: str, results: Path) -> list[Time]:
             for strategy in found.suite.strategies if name == scenario else ():
                 if records := found.of(task, strategy):
                     finished = sum(record.get("finished", False) for record in records)
-                    seconds = median_interval(found.values(task, strategy, measure)).text(",.0f")
+                    seconds = format(median_interval(found.values(task, strategy, measure)), ",.0f")
                     who = (team or "1 robot") + words
                     times.append(Time(who, strategy, len(records), finished, seconds, "scoreboard"))
     return times

@@ -57,15 +57,6 @@ def test_json_is_one_object_with_machine_and_rows(measured, capsys):
     assert "[1/1] sums" in err
 
 
-def test_strict_asks_for_every_goal(measured, capsys):
-    measured(HELD, FREE)
-    assert run("--strict", "--json") == 0
-    measured(HELD, MISSED)
-    assert run("--strict", "--json") == 1
-    assert run("--json") == 0
-    assert len(json.loads("[" + capsys.readouterr().out.replace("}\n{", "},{") + "]")) == 3
-
-
 def test_out_writes_the_page(measured, capsys, tmp_path: Path):
     measured(HELD, MISSED, FREE)
     page = tmp_path / "speed.md"
