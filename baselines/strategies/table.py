@@ -14,7 +14,6 @@ from enum import Enum
 from functools import partial
 from types import MappingProxyType
 
-from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig
 from baselines.strategies.protocol import Strategy
 from baselines.strategies.rules.assigned_frontier import AssignedFrontier
 from baselines.strategies.rules.cliff import CliffNextBestView
@@ -93,7 +92,7 @@ _PAPER = (
     ),
     Entry(
         "ground-gradient",
-        partial(MutualInformation, MutualInformationConfig(coordinated=False)),
+        partial(MutualInformation, coordinated=False),
         "`mutual-information` without teammates: λ = η = 1 (RochaMI)",
     ),
     Entry(

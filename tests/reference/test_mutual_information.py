@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines.strategies.mutual_information.candidates import (
+from baselines.strategies.neighbourhood import (
     INTERFERENCE,
     MATE,
     Body,

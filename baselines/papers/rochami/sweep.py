@@ -6,9 +6,9 @@ import math
 from typing import Any
 
 from baselines.experiments.experiment import Amount
+from baselines.experiments.mission import mission_record
 from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.papers.rochami.mission import Run
-from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import LAB, ROOM
 
@@ -66,7 +66,7 @@ def experiment(amount: Amount) -> list[CellTrial]:
         short = {"robots": robots, "robot": {"reach_m": 1.0}}
         cells.append(_cell(f"n{robots}-random-1m", short, "random", starts))
     for kappa in QUICK_KAPPAS if quick else KAPPAS[1:]:
-        cells.append(_cell(kappa_id(kappa), {"robots": 2}, "coordinated", starts, {"distance_cost": kappa}))
+        cells.append(_cell(kappa_id(kappa), {"robots": 2}, "coordinated", starts, kappa))
     return trials_of(cells + _sharing_cells(starts, quick))
 
 
@@ -75,16 +75,16 @@ def _cell(
     settings: dict[str, Any],
     method: str,
     starts: int,
-    coordination_settings: dict[str, Any] | None = None,
+    kappa: float | None = None,
 ) -> Cell:
     scenario = with_settings(with_settings(LAB, _BASE), settings)
     if method != "coordinated":
         scenario = with_settings(scenario, {"channel": {"announcements": False}})
     if method == "random":
         return Cell(name, scenario, "random", starts)
-    own = {"coordinated": method == "coordinated", **(coordination_settings or {})}
     strategy = "mutual-information" if method == "coordinated" else "ground-gradient"
-    return Cell(name, scenario, strategy, starts, Run(MutualInformationConfig(**own)))
+    record = mission_record if kappa is None else Run(kappa)
+    return Cell(name, scenario, strategy, starts, record)
 
 
 def _sharing_cells(starts: int, quick: bool) -> list[Cell]:

@@ -22,7 +22,8 @@ from collections import deque
 
 import numpy as np
 
-from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig, Neighbourhood
+from baselines.strategies.neighbourhood import Neighbourhood
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.knowledge import random_viewpoint
 from entropy_explore_env.planner.driver import Driver, Trail
 from entropy_explore_env.robots.knowledge import RobotKnowledge
@@ -35,28 +36,33 @@ _MEMORY, _REPEATS = 8, 2
 
 
 class MutualInformation(Driver):
-    """Chooses viewpoints by eq. 13; coordinated or not.
-
-    Attributes:
-        config: The settings.
-        decisions: How many of this mission's decisions followed the rule, and why the others wandered: a
-            teammate was in the way, no candidate had a gain, or it was a trap.
-    """
+    """Chooses viewpoints by eq. 13; coordinated or not."""
 
     rule = "mutual-information"
     most_blocked = 0
     repeats = True
 
-    def __init__(self, config: MutualInformationConfig | None = None) -> None:
-        """Take the settings; None = the defaults."""
-        self.config = config or MutualInformationConfig()
+    def __init__(self, coordinated: bool = True, distance_cost: float = 0.0) -> None:
+        """Take the settings.
+
+        Args:
+            coordinated: Whether λ, η and ρ use what teammates announce.
+            distance_cost: κ ≥ 0.
+
+        Raises:
+            SettingError: One of them is not allowed.
+        """
+        if not isinstance(coordinated, bool):
+            raise SettingError("coordinated", coordinated, "True or False")
+        if not 0.0 <= distance_cost < math.inf:
+            raise SettingError("distance_cost", distance_cost, "a number ≥ 0")
+        self._settings = coordinated, distance_cost
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
         super().reset(scenario, rng)
-        self.decisions = {"rule": 0, "blocked": 0, "nothing": 0, "trap": 0}
         self._chosen = [deque[np.ndarray](maxlen=_MEMORY) for _ in range(scenario.robots)]
-        self._neighbourhood = Neighbourhood(self.config, scenario, rng)
+        self._neighbourhood = Neighbourhood(*self._settings, scenario, rng)
 
     def give_way(self, view: RobotKnowledge, trail: Trail) -> None:
         """Leave it to the rule: by RochaMI a robot wanders, or waits in place (`Robot.when_blocked`)."""
@@ -64,20 +70,16 @@ class MutualInformation(Driver):
     def decide(self, view: RobotKnowledge) -> np.ndarray | None:
         """Return the viewpoint (5,) by the robot's belief and what it has heard; None = it wanders."""
         if view.move_end is MoveEnd.TEAMMATE and view.kind.robot.when_blocked == "wander":
-            self.decisions["blocked"] += 1
             return None
         chosen, edge_m = self._chosen[view.robot], view.scenario.grid.voxel_size_m
         viewpoint = self._neighbourhood.best(view)
         if viewpoint is None:
-            self.decisions["nothing"] += 1
             return None
         alike = sum(_alike(viewpoint, earlier, edge_m) for earlier in chosen)
         if alike >= _REPEATS:
             chosen.clear()
-            self.decisions["trap"] += 1
             return random_viewpoint(view, self._rng)
         chosen.append(viewpoint)
-        self.decisions["rule"] += 1
         return viewpoint
 
 

@@ -35,8 +35,8 @@ def as_the_paper_says(starts=20) -> dict[str, list[Record]]:
         elif cell.strategy == "random":
             time_s *= 1.2 * joint[n]
         else:
-            time_s *= (joint if cell.record.coordination.coordinated else apart)[n]
-            kappa = cell.record.coordination.distance_cost
+            time_s *= (joint if cell.strategy == "mutual-information" else apart)[n]
+            kappa = getattr(cell.record, "distance_cost", 0.0)
             time_s *= 1.0 + 0.5 * kappa
             way_m /= 1.0 + 0.5 * kappa + 2.0 * min(kappa, 0.25)
         records[cell.id] = [

@@ -9,7 +9,6 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import STRATEGIES, make_strategy
-from baselines.strategies.mutual_information.neighbourhood import MutualInformationConfig
 from baselines.strategies.rules.mutual_information import MutualInformation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
@@ -34,11 +33,11 @@ def frontier(robots=2, **changes):
     return missions
 
 
-def chosen(missions, coordination=None, times=20, robot=0, heard=None):
+def chosen(missions, times=20, robot=0, heard=None, **settings):
     """(times, 5) what a robot chooses, each time with other chances."""
     found = []
     for seed in range(times):
-        strategy = MutualInformation(coordination)
+        strategy = MutualInformation(**settings)
         strategy.reset(missions.scenario, np.random.default_rng(seed))
         missions.state.robots[0, robot]["depth_m"] = 2.0
         missions.state.robots[0, robot]["half_angle_rad"] = 0.5
@@ -78,7 +77,7 @@ def test_what_a_teammate_announced_to_see_is_left_to_it_unless_it_was_lost():
     assert (coordinated[:, 1] < 2.75).all()
     lost = chosen(frontier(), heard=None)
     assert {bool(y > 2.75) for y in lost[:, 1]} == {True, False}
-    alone = chosen(frontier(), MutualInformationConfig(coordinated=False), heard=looks_up)
+    alone = chosen(frontier(), heard=looks_up, coordinated=False)
     assert {bool(y > 2.75) for y in alone[:, 1]} == {True, False}
     np.testing.assert_array_equal(alone, lost)
 
@@ -86,18 +85,15 @@ def test_what_a_teammate_announced_to_see_is_left_to_it_unless_it_was_lost():
 def test_no_robot_goes_through_a_teammate_of_which_it_knows():
     in_the_way = hear((1.75, 3.5, 1.25, 0.0, 0.0), depth_m=0.0)
     for coordinated in (True, False):
-        config = MutualInformationConfig(coordinated=coordinated)
-        straight_up = chosen(frontier(robot={"body_radius_m": 0.25}), config, 60, heard=in_the_way)
+        bodies = frontier(robot={"body_radius_m": 0.25})
+        straight_up = chosen(bodies, 60, heard=in_the_way, coordinated=coordinated)
         ahead = (np.abs(straight_up[:, 0] - 1.75) < 0.3) & (straight_up[:, 1] > 3.5)
         assert ahead.any() != coordinated
 
 
 def test_distance_costs():
     near, far = (
-        np.linalg.norm(
-            chosen(frontier(1), MutualInformationConfig(distance_cost=k))[:, :2] - (1.75, 2.75), axis=1
-        )
-        for k in (1.0, 0.0)
+        np.linalg.norm(chosen(frontier(1), distance_cost=k)[:, :2] - (1.75, 2.75), axis=1) for k in (1.0, 0.0)
     )
     assert near.max() <= far.min() + 1e-9 < far.max()
 
@@ -182,5 +178,5 @@ def test_one_robot_is_not_coordinated_with_anybody():
     ],
 )
 def test_settings_out_of_range_are_refused(name, value):
-    with pytest.raises(SettingError, match=f"MutualInformationConfig.{name} = {value!r}"):
-        MutualInformationConfig(**{name: value})
+    with pytest.raises(SettingError, match=f"{name} = {value!r}"):
+        MutualInformation(**{name: value})
