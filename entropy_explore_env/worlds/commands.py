@@ -1,7 +1,7 @@
 """List, draw and convert worlds: `python -m entropy_explore_env worlds list | show | convert`.
 
     list [FOLDER]                      scenarios and names, or the files of a folder that can be read
-    show NAME_OR_FILE --out world.png  a picture with metres, and where robots may start
+    show NAME_OR_FILE --out world.png  sizes and where robots may start, and a picture with metres
     convert IN OUT.npz                 a file that loads fast, without loss
 
 Results go to standard output, errors in one line to standard error. Exit codes: 0 done, 2 bad input, 130
@@ -65,19 +65,21 @@ def main(words: Sequence[str]) -> int:
     if args.command == "list":
         _list(args.folder)
         return 0
-    target: Path = args.out
+    target: Path | None = args.out
     suffix = ".png" if args.command == "show" else ".npz"
-    if target.suffix.lower() != suffix or target.is_dir():
+    if target is not None and (target.suffix.lower() != suffix or target.is_dir()):
         raise SettingError("out", str(target), f"a file whose name ends in {suffix}")
     world = _world(args)
     about = _about(world)
     if args.command == "show":
         starts, said = _starts(world, args.source)
-        about += f"; {said}"
-        write_atomically(target, picture(world, starts))
+        print(f"{args.source}: {about}; {said}")
+        if target is not None:
+            write_atomically(target, picture(world, starts))
+            print(target)
     else:
-        save_world(world, target)
-    print(f"{target}: {about}")
+        save_world(world, args.out)
+        print(f"{target}: {about}")
     if args.source in PUBLIC:
         source = PUBLIC[args.source].source
         print(f"licence: {source.licence}\ncite: {source.citation}")
@@ -94,7 +96,7 @@ def _parser() -> argparse.ArgumentParser:
     listing.add_argument("folder", nargs="?", type=Path, help="list the files in it, and in folders in it")
     show = commands.add_parser("show", help="draw a world")
     show.add_argument("source", metavar="NAME_OR_FILE")
-    show.add_argument("--out", type=Path, required=True, help="a PNG")
+    show.add_argument("--out", type=Path, help="a PNG; default: no picture")
     convert = commands.add_parser("convert", help="save a world as .npz")
     convert.add_argument("source", metavar="IN")
     convert.add_argument("out", type=Path, metavar="OUT.npz")

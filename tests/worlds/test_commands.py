@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -42,10 +44,23 @@ def test_show_writes_a_picture(floor, capsys, source):
     given = source if source in SCENARIOS else str(floor)
     assert run_command(main, ["show", given, "--out", str(out)]) == 0
     said = capsys.readouterr()
-    assert said.out.startswith(f"{out}: ") and "voxels of" in said.out and said.err == ""
+    assert said.out.startswith(f"{given}: ") and said.out.splitlines()[-1] == str(out) and said.err == ""
+    assert "voxels of" in said.out
     assert "0.55 × 0.35 m" in said.out or "9 × 7 × 4 m" in said.out or source in SCENARIOS
     assert "may start in" in said.out or "have no room" in said.out
     assert out.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("words", [[], ["--out", "world.png"]])
+def test_show_says_sizes_and_starts_without_matplotlib(floor, capsys, monkeypatch, words):
+    monkeypatch.chdir(floor.parent)
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    assert run_command(main, ["show", str(floor), *words]) == (2 if words else 0)
+    said = capsys.readouterr()
+    assert "0.55 × 0.35 m" in said.out and ("may start in" in said.out or "have no room" in said.out)
+    told = "matplotlib is not installed: pip install 'entropy_explore_env[baselines]'"
+    assert said.err.count("\n") == (1 if words else 0) and (told in said.err) is bool(words)
+    assert not (floor.parent / "world.png").exists()
 
 
 def test_a_world_of_a_number_is_that_of_make_world(tmp_path, capsys):
