@@ -70,7 +70,8 @@ def replay_bag(args: BagArgs) -> int:
     reader = BagReader(args.bag, args.topic, args.map_frame, args.frames)
     rows = list(_decisions(reader, args))
     if not rows:
-        raise RecordError("bag", str(args.bag), f"a bag in which the poses of {reader.robots} are known")
+        allowed = f"a bag in which maps or scans and the poses of {reader.robots} are known in the frame"
+        raise RecordError("bag", str(args.bag), f"{allowed} {args.map_frame!r} (--map-frame, --frames)")
     spent = [row["ms"] for row in rows[1:]] or [rows[0]["ms"]]
     summary = {
         "bag": str(args.bag),

@@ -2,6 +2,7 @@
 
 Bags of ROS 1 and 2 are read with rosbags, without ROS. Maps are OccupancyGrid or Octomap messages; where a
 bag has none, PointCloud2 messages are scans. Poses come from tf, and from Odometry in the map's frame.
+Maps and scans whose frame no transform brings into the map's frame are left out.
 Messages are taken in the order in which they were recorded: stamps in their headers, which may run back, do
 not matter.
 """
@@ -19,6 +20,7 @@ from entropy_explore_env.errors import RecordError, SettingError, WorldError, on
 from entropy_explore_env.interop.bag_writer import typestore
 from entropy_explore_env.interop.messages import (
     grid_of_message,
+    lies_level,
     matrix_of,
     percent_of,
     pose_of_matrix,
@@ -35,8 +37,6 @@ _BASES = ("base_footprint", "base_link")
 """Frames of a robot in bags without Odometry."""
 _FLOATS = {7: "f4", 8: "f8"}
 _MOST_LINKS = 100
-_LEVEL = 1.0 - 1e-6
-"""Least cosine between the vertical axes of a map's frame and of the map frame."""
 
 
 class MapHeard(NamedTuple):
@@ -236,18 +236,18 @@ class BagReader:
             frames.hear(self._map_frame, message.child_frame_id, at.position, at.orientation)
 
     def _heard(self, message: Any, kind: str, time_s: float, frames: Frames) -> MapHeard | ScanHeard | None:  # noqa: ANN401
-        """Return what a map or scan says; None = no robot's pose, or not the sensor's, is known yet."""
+        """Return what a map or scan says; None = its frame, or all robots, are not placed yet."""
         matrices = {number: frames.to(self._map_frame, name) for number, name in enumerate(self.robots)}
         poses = {number: pose_of_matrix(each) for number, each in matrices.items() if each is not None}
         if not poses:
             return None
         frame = frames.to(self._map_frame, message.header.frame_id)
+        if frame is None:
+            return None
         if kind in (_GRID, _TREE):
             percent, corner, edge_m = _map_of(message, kind)
             origin, bottom_m = in_map_frame(corner, frame)
             return MapHeard(time_s, percent, origin, bottom_m, edge_m, poses)
-        if frame is None:
-            return None
         points = points_of_cloud(message) @ frame[:3, :3].T + frame[:3, 3]
         robot = next((n for n, name in enumerate(self.robots) if name in message.header.frame_id), 0)
         return ScanHeard(time_s, robot, pose_of_matrix(frame), points, poses)
@@ -264,36 +264,35 @@ def _map_of(message: Any, kind: str) -> tuple[np.ndarray, np.ndarray, float]:  #
     return percent_of(labels), np.array([*(low * edge_m), 0.0, 0.0]), edge_m
 
 
-def in_map_frame(corner: np.ndarray, frame: np.ndarray | None) -> tuple[tuple[float, float, float], float]:
+def in_map_frame(corner: np.ndarray, frame: np.ndarray) -> tuple[tuple[float, float, float], float]:
     """Return ((x, y, yaw), z) of a level grid's corner in the map frame.
 
     Args:
         corner: (5,) its pose in the frame of the grid.
-        frame: (4, 4) from that frame to the map frame; None = no transform was heard, and they are the same.
+        frame: (4, 4) from that frame to the map frame.
 
     Raises:
         SettingError: The frame of the grid is not level.
     """
-    if frame is None:
-        frame = np.eye(4)
-    if frame[2, 2] < _LEVEL:
+    if not lies_level(frame[:3, :3]):
         raise SettingError("frame of the map", frame[:3, :3].tolist(), "one that lies level in the map frame")
     x, y, z = (float(v) for v in frame[:3, :3] @ corner[:3] + frame[:3, 3])
     return (x, y, float(corner[3]) + gaze_of(frame)[0]), z
 
 
-def world_of_bag(path: Path | str, topic: str | None = None) -> World:
-    """Return the world of the last map of a bag; unknown space is solid.
+def world_of_bag(path: Path | str, topic: str | None = None, map_frame: str = "map") -> World:
+    """Return the world of the last map of a bag; unknown space is solid. Arguments are as for `BagReader`.
 
     Raises:
         RecordError, SettingError, MissingExtraError: As for `BagReader`.
         WorldError: It has no map, or one without free space.
     """
-    reader, last = BagReader(path, topic), None
+    reader, last = BagReader(path, topic, map_frame), None
     for heard in reader:
         last = heard if isinstance(heard, MapHeard) else last
     if last is None:
-        raise WorldError("bag", str(path), "a bag with an OccupancyGrid or an Octomap")
+        allowed = f"a bag with an OccupancyGrid or an Octomap whose place in the frame {map_frame!r} is known"
+        raise WorldError("bag", str(path), allowed)
     percent = last.percent if last.percent.ndim == 3 else last.percent[:, :, None]
     x, y, yaw_rad = last.origin
     shape = (percent.shape[0], percent.shape[1], percent.shape[2])

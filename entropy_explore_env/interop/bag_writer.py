@@ -39,6 +39,8 @@ OCTOMAP_TYPES = {
     )
 }
 _POSES_PER_S, _MAP_EVERY_S = 5.0, 2.0
+_MOST_SCANS = 1024
+"""Most scans of a step that are written, the latest."""
 
 
 def typestore() -> Any:  # noqa: ANN401 - a Typestore
@@ -64,11 +66,11 @@ class BagWriter:
         """Begin a bag; `note` follows the mission.
 
         Args:
-            missions: Missions, the first of which is written.
+            missions: A single one.
             folder: The bag, which must not exist.
 
         Raises:
-            SettingError: It exists.
+            SettingError: It exists, or there are several missions.
             MissingExtraError: rosbags is not installed.
         """
         self._store = typestore()
@@ -76,13 +78,16 @@ class BagWriter:
 
         if folder.exists():
             raise SettingError("bag", str(folder), "a folder that does not exist yet")
+        if missions.count > 1:
+            raise SettingError("missions", missions.count, "a single mission in a bag")
         self.path, self._missions = folder, missions
+        self._log = missions.log_scans(_MOST_SCANS)
         self._writer = Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP)
         self._writer.open()
         self._finished, self._topics = False, {}
         self._noted_s, self._map_due_s = -1.0, 0.0
         robots = missions.scenario.robots
-        self._scans, self._departed_s = np.zeros(robots, np.int64), np.full(robots, -1.0)
+        self._departed_s = np.full(robots, -1.0)
         edge_m, corner_m = missions.grid.voxel_size_m, np.asarray(missions.grid.origin_m)
         self._octomap_m = corner_m - np.rint(corner_m / edge_m) * edge_m
         """(3,) origin of the frame `octomap` in the map frame, at most half a voxel edge along each axis."""
@@ -108,7 +113,7 @@ class BagWriter:
     def note(self) -> None:
         """Write what happened since the last moment, after the reset or a step.
 
-        In a step each robot has one drive, whose poses are known; of scans in a step the latest is written.
+        In a step each robot has one drive, whose poses are known.
         """
         state, time_s = self._missions.state, float(self._missions.state.missions[0]["time_s"])
         robots = state.robots[0]
@@ -118,17 +123,26 @@ class BagWriter:
                 self._write_drive(robot, own)
         params = self._missions.rules.params
         first = math.floor(self._noted_s * _POSES_PER_S) + 1 if self._noted_s >= 0.0 else 0
-        for tick in range(first, math.ceil(time_s * _POSES_PER_S)):
-            at_s = tick / _POSES_PER_S
-            self._write_poses(at_s, np.array([pose_at(params[n], own, at_s) for n, own in enumerate(robots)]))
+        scans, log = min(int(self._log.count[0]), _MOST_SCANS), self._log
+        ticks = np.arange(first, math.ceil(time_s * _POSES_PER_S)) / _POSES_PER_S
+        moments = np.union1d(ticks, log.time_s[:scans])
+        for at_s in moments[moments < time_s].tolist():
+            poses = np.array([pose_at(params[n], own, at_s) for n, own in enumerate(robots)])
+            self._write_moment(at_s, poses, np.flatnonzero(log.time_s[:scans] == at_s))
         if time_s > self._noted_s:
-            self._write_poses(time_s, poses_now(self._missions, 0))
-        for robot in np.flatnonzero(robots["scans"] > self._scans):
-            self._write_scan(int(robot), time_s)
-        self._scans, self._noted_s = robots["scans"].copy(), time_s
+            last = np.flatnonzero(log.time_s[:scans] >= time_s)
+            self._write_moment(time_s, poses_now(self._missions, 0), last)
+        self._log.count[0], self._noted_s = 0, time_s
         if time_s >= self._map_due_s:
             self._write_map(time_s)
             self._map_due_s = time_s + _MAP_EVERY_S
+
+    def _write_moment(self, time_s: float, poses: np.ndarray, scans: np.ndarray) -> None:
+        """Write where all robots are, (A, 5), and scans with these numbers in the log."""
+        poses[self._log.robot[scans]] = self._log.pose[scans]
+        self._write_poses(time_s, poses)
+        for number in scans.tolist():
+            self._write_scan(number, time_s)
 
     def _write(self, topic: str, kind: str, time_s: float, **fields: Any) -> None:  # noqa: ANN401
         """Write a message of a type at a simulated time."""
@@ -229,13 +243,13 @@ class BagWriter:
             "mesh_use_embedded_materials": False,
         }
 
-    def _write_scan(self, robot: int, time_s: float) -> None:
-        """Write the hits of a robot's latest scan as points in its frame: x along the gaze."""
-        state, sensor = self._missions.state, self._missions.scenario.kind_of(robot).sensor
-        model, pose = sensor_model(sensor), state.robots[0, robot]["scan_pose"]
-        yaw, pitch = float(pose[3]), float(pose[4])
-        hit = state.scan_returned[0, robot, : sensor.rays] == int(Return.HIT)
-        ranges_m = state.scan_range_m[0, robot, : sensor.rays][hit]
+    def _write_scan(self, number: int, time_s: float) -> None:
+        """Write the hits of a scan in the log as points in its robot's frame: x along the gaze."""
+        log, robot = self._log, int(self._log.robot[number])
+        sensor = self._missions.scenario.kind_of(robot).sensor
+        model, (yaw, pitch) = sensor_model(sensor), log.pose[number, 3:].tolist()
+        hit = log.returned[number, : sensor.rays] == int(Return.HIT)
+        ranges_m = log.range_m[number, : sensor.rays][hit]
         rays = ray_directions(model.yaw_offsets, model.pitch_offsets, yaw, pitch)[hit]
         rays = rays @ gaze_matrix(yaw, pitch)
         points = (rays * ranges_m[:, None]).astype("<f4")

@@ -19,8 +19,8 @@ ARROW_M = (0.6, 0.12, 0.12)
 """Length, width and height of the arrow at a robot's goal."""
 _MOST_VOXELS = 1 << 27
 """A tree may say that a few bytes fill the world."""
-_LEVEL = 1e-3
-"""Largest x and y of the quaternion of a map that lies level."""
+_LEVEL = 1.0 - 1e-6
+"""Least cosine between the vertical axes of a map that lies level and of its frame."""
 
 
 class GridMessage(NamedTuple):
@@ -51,11 +51,16 @@ def grid_of_message(message: Any) -> GridMessage:  # noqa: ANN401 - any class wi
         raise SettingError("message", type(message).__name__, "a nav_msgs/OccupancyGrid") from None
     if width * height < 1 or rows.shape != (width * height,):
         raise SettingError("message.data", rows.shape, f"{width} × {height} numbers, as info says")
-    if abs(turn[0]) > _LEVEL or abs(turn[1]) > _LEVEL:
+    if not lies_level(quaternion_matrix(*map(float, turn))):
         raise SettingError("message.info.origin", turn, "an orientation about z alone")
     grid = np.ascontiguousarray(rows.astype(np.int8, copy=False).reshape(height, width).T)
     yaw = 2.0 * math.atan2(float(turn[2]), float(turn[3]))
     return GridMessage(grid, (corner[0], corner[1], yaw), resolution_m, corner[2])
+
+
+def lies_level(rotation: np.ndarray) -> bool:
+    """Return whether a rotation (3, 3) turns about the vertical axis alone."""
+    return bool(rotation[2, 2] >= _LEVEL)
 
 
 def voxels_of_tree(data: bytes, binary: bool) -> tuple[np.ndarray, np.ndarray]:

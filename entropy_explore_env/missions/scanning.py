@@ -18,6 +18,7 @@ from entropy_explore_env.missions.need import share_by_need
 from entropy_explore_env.missions.own_maps import note_measured
 from entropy_explore_env.missions.phases import collect_batch
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
+from entropy_explore_env.missions.scan_log import log_scan
 from entropy_explore_env.missions.scoring import note_idle, note_seen, score_scan
 from entropy_explore_env.missions.summaries import share_summary
 from entropy_explore_env.robots.channel import select_measurements, steered_i_min
@@ -65,6 +66,7 @@ def scan_and_share(mission, sensor, index, work):
     own_map = mission.maps.beliefs.mean[index], mission.maps.beliefs.precision[index]
     choose_landmark(team.localization, params, index, scene, scan, own_map, work.covariances)
     note_scan(robot, mission.latest, scan, index)
+    log_scan(work.log, scan, index, clock.time_s, robot.scan_pose)
     if params.track_truth:
         known = clock.explored_visible
         score_scan(clock, mission.joint, mission.truth, scan, params.prior_precision)

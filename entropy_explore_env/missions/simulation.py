@@ -18,6 +18,7 @@ from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.reset_options import DRAWN, ResetOptions
 from entropy_explore_env.missions.rules import rules_of
+from entropy_explore_env.missions.scan_log import ScanLog, new_scan_log
 from entropy_explore_env.missions.state import FROM_WORLD, MissionState, new_state
 from entropy_explore_env.missions.state_ranges import check_ranges
 from entropy_explore_env.missions.world_changes import (
@@ -115,6 +116,12 @@ class Missions:
     def _make_compiled_step(self) -> None:
         """Threads and their memory; none of it is state."""
         self._compiled_step = CompiledStep(self.scenario, self.rules, self.layout, self.count, self.threads)
+
+    def log_scans(self, most: int) -> ScanLog:
+        """Return a log that the steps of all missions fill from now on, with the latest `most` scans."""
+        log = new_scan_log(most, max(kind.sensor.rays for kind in self.scenario.kinds))
+        self._compiled_step.work = [work._replace(log=log) for work in self._compiled_step.work]
+        return log
 
     @property
     def grid(self) -> Grid:

@@ -12,6 +12,7 @@ from entropy_explore_env.belief.map_update import Scan
 from entropy_explore_env.belief.raycast import Crossing, longest_crossing
 from entropy_explore_env.missions.backlog import Selection, new_selection
 from entropy_explore_env.missions.records import WAYPOINTS
+from entropy_explore_env.missions.scan_log import ScanLog, new_scan_log
 from entropy_explore_env.robots.map_summary import new_summary_tree
 from entropy_explore_env.robots.map_tree import Tree
 from entropy_explore_env.robots.navigator import Navigator, footprints
@@ -42,6 +43,8 @@ class Workspace(NamedTuple):
     """(K, B, 3) int64, offsets of the voxels that bodies of each kind of robot touch; B = 0 if none plans."""
     covariances: np.ndarray | None
     """(2, 4, 4) float64; None = no robot chooses landmarks in its own map: nothing of that is compiled."""
+    log: ScanLog
+    """Every scan, if somebody asked for them: `Missions.log_scans`."""
 
 
 def new_workspace(scenario: Scenario, navigators: Mapping[int, Navigator]) -> Workspace:
@@ -63,6 +66,7 @@ def new_workspace(scenario: Scenario, navigators: Mapping[int, Navigator]) -> Wo
         if navigators
         else np.zeros((len(kinds), 0, 3), np.int64),
         covariances=np.zeros((2, 4, 4)) if scenario.drifts and scenario.fiducials.own_number else None,
+        log=new_scan_log(0, max(sensor.rays for sensor in sensors)),
     )
 
 

@@ -97,6 +97,35 @@ def test_figures_of_a_mission_are_those_of_its_bag(office):
     assert np.array_equal(grid_of_message(last).grid, percent)
 
 
+def test_every_scan_of_a_step_is_in_the_bag(tmp_path):
+    settings = {"sensor": {"scan_every_m": 0.2}, "robots": 2, "ending": {"time_limit_s": 20.0}}
+    env = EntropyExploreEnv(with_settings(scripted(find_scenario("office")), settings))
+    steps, scans = [], env.missions.state.robots[0]["scans"]
+    with BagWriter(env.missions, tmp_path / "bag") as bag:
+
+        def note(_):
+            steps.append(scans.sum())
+            bag.note()
+
+        run_mission(env, PlannedRate(), 0, note)
+        bag.finish()
+    assert np.diff(steps).max() > 2
+    for number in range(2):
+        reader = BagReader(tmp_path / "bag", f"/robot_{number}/scan")
+        heard = [each for each in reader if isinstance(each, ScanHeard)]
+        assert len(heard) == scans[number]
+        apart_m = np.linalg.norm(np.diff([each.pose[:2] for each in heard], axis=0), axis=1)
+        assert 0.1 < np.median(apart_m) < 0.21
+        assert np.allclose(heard[-1].pose, env.missions.state.robots[0, number]["scan_pose"])
+
+
+def test_a_map_without_a_place_is_left_out_as_scans_are(office):
+    assert any(isinstance(each, MapHeard) for each in BagReader(office[0], "/map"))
+    assert not list(BagReader(office[0], "/map", map_frame="world", robots=["robot_0"]))
+    with pytest.raises(WorldError, match="whose place in the frame 'world' is known"):
+        world_of_bag(office[0], map_frame="world")
+
+
 def test_mcap_finds_schemas_and_all_messages(office):
     folder, _ = office
     with (folder / "office.mcap").open("rb") as file:
