@@ -23,7 +23,6 @@ FLOOR = (1674, 1006, 1)
 SOURCES = 4
 _MAP_SHARE, _FLOOR_SHARE = 0.25, 0.16
 _EDGES = (4, 40)
-_ROOM = 40
 _PRIOR, _KNOWN = 1e-3, 100.0
 
 
@@ -34,21 +33,6 @@ def cluttered(shape: tuple[int, int, int], share: float, seed: int = 0) -> np.nd
         x, y = rng.integers(0, shape[:2])
         wide, deep = rng.integers(*_EDGES, 2)
         covered[x : x + wide, y : y + deep] = True
-    return covered
-
-
-def rooms(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
-    """Return (X, Y, 1) bool, walls every 40 cells, with a door of 6 cells between neighbouring rooms."""
-    rng, covered = np.random.default_rng(seed), np.zeros(shape, bool)
-    for x in range(_ROOM, shape[0], _ROOM):
-        covered[x] = True
-    for y in range(_ROOM, shape[1], _ROOM):
-        covered[:, y] = True
-    for x in range(0, shape[0], _ROOM):
-        for y in range(0, shape[1], _ROOM):
-            along = 1 + int(rng.integers(_ROOM - 8))
-            covered[x + _ROOM : x + _ROOM + 1, y + along : y + along + 6] = False
-            covered[x + along : x + along + 6, y + _ROOM : y + _ROOM + 1] = False
     return covered
 
 
@@ -97,7 +81,6 @@ def planning_rows(effort: Effort) -> list[Row]:
     """Voronoi cells of four sources beside SciPy, and a plan across a floor."""
     maps = {
         "boxes": traversal_costs(cluttered(MAP, _MAP_SHARE)),
-        "rooms": traversal_costs(rooms(MAP)),
         "a maze": traversal_costs(maze(MAP)),
         "white-noise costs": noise(MAP),
     }

@@ -12,6 +12,7 @@ import math
 import multiprocessing
 import os
 import pickle
+import re
 import signal
 import threading
 import traceback
@@ -19,6 +20,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError  # another one in Python 3.10
 from dataclasses import dataclass
+from pathlib import Path
 from queue import SimpleQueue
 from types import FrameType
 from typing import Any, TypeVar
@@ -115,6 +117,12 @@ def _outcome(future: Future[bytes], limit_s: float) -> Any:  # noqa: ANN401 - wh
         return Failure(_ending(error.exitcode))
     except Exception as error:  # the task cannot be passed on, or its result not be read
         return failure_of(error)
+
+
+def place_of(trace: str) -> str:
+    """Return file and line where an error was raised, as ` (file.py, line 3)`; empty without a trace."""
+    frames = re.findall(r'File "([^"]+)", line (\d+)', trace)
+    return f" ({Path(frames[-1][0]).name}, line {frames[-1][1]})" if frames else ""
 
 
 def _ending(code: int) -> str:

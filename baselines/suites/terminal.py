@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from baselines.experiments.tables import terminal_table
+from baselines.experiments.worker_pool import place_of
 from baselines.strategies import shown_name, shown_names
 from baselines.suites.page import shown, tasks_table
-from baselines.suites.results import Results, Row, failed_rows, overall_rows, task_rows
+from baselines.suites.results import Results, failed_rows, overall_rows, task_rows
 
 
 def printed_results(results: Results) -> dict[str, Any]:
@@ -40,7 +39,9 @@ def show_results(results: Results, refused: Sequence[str], tables: bool) -> None
     for row in failed_rows(results):
         missions = ", ".join(map(str, row["missions"]))
         where = f"{shown_name(row['strategy'])}, {row['task']}, missions {missions}"
-        print(f"failed: {where}: {row['reason']}{_place_of(results, row)}")
+        (task,) = (task for task in results.tasks if task.name == row["task"])
+        trace = results.numbered(task, row["strategy"])[row["missions"][0]].get("trace", "")
+        print(f"failed: {where}: {row['reason']}{place_of(trace)}")
     for reason in refused:
         print(f"refused: {reason}")
     if not any(row["finished"] for row in overall_rows(results)):
@@ -62,11 +63,3 @@ def _overall_table(results: Results) -> str:
         for row in rows
     ]
     return terminal_table(["strategy", "missions", "finished", measure.words, "ms a decision"], cells)
-
-
-def _place_of(results: Results, row: Row) -> str:
-    """Return file and line where missions of a row failed, if their process told."""
-    (task,) = (task for task in results.tasks if task.name == row["task"])
-    trace = results.numbered(task, row["strategy"])[row["missions"][0]].get("trace", "")
-    frames = re.findall(r'File "([^"]+)", line (\d+)', trace)
-    return f" ({Path(frames[-1][0]).name}, line {frames[-1][1]})" if frames else ""

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from baselines.experiments.worker_pool import Failure, run_each
+from baselines.experiments.worker_pool import Failure, place_of, run_each
 from entropy_explore_env.missions.simulation import Missions
 
 
@@ -41,14 +39,10 @@ def play_cases(
         limit_s: Elapsed seconds that a case may take.
     """
     for number, outcome in run_each(play, numbers, 1, limit_s, apart=True):
-        yield number, _said(outcome) if isinstance(outcome, Failure) else outcome
-
-
-def _said(failure: Failure) -> str:
-    """Return why a case failed, and where."""
-    frames = re.findall(r'File "([^"]+)", line (\d+)', failure.trace)
-    place = f" ({Path(frames[-1][0]).name}:{frames[-1][1]})" if frames else ""
-    return failure.reason[:2000] + place
+        yield (
+            number,
+            (outcome.reason[:2000] + place_of(outcome.trace) if isinstance(outcome, Failure) else outcome),
+        )
 
 
 def check_step(missions: Missions, rewards: Iterable[Any]) -> None:

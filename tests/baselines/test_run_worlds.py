@@ -14,24 +14,7 @@ from baselines.cli.world_options import Reading
 from benchmarks.proofs.world_samples import pgm
 from entropy_explore_env.reports.mission_record import load_record
 from entropy_explore_env.worlds.formats import LOAD_OPTIONS
-from tests.baselines.ran import SHORT, check_refused
-
-
-def test_a_world_file_takes_the_place_of_the_scenario_s_world(command, tmp_path):
-    octomap = pytest.importorskip("octomap")
-    tree = octomap.OcTree(0.25)
-    for voxel in np.ndindex(8, 12, 6):
-        solid = voxel[0] in (0, 7) or voxel[1] in (0, 11) or voxel[2] in (0, 5)
-        tree.updateNode((np.asarray(voxel) + 0.5) * 0.25 - 1.0, solid)
-    path = tmp_path / "hut.bt"
-    assert tree.writeBinary(str(path).encode())
-    words = ["box-7x11x5", "--world", str(path), "--robots", "2", "--json", *SHORT]
-    fine = json.loads(command(*words, "--voxel-size-m", "0.25").out)
-    assert (fine["scenario"], fine["world"]) == ("box-7x11x5", "hut")
-    voxel_bits = 0.5 * np.log2(2 * np.pi * np.e) + np.log2(30.0)
-    assert fine["entropy_start_bits"] == pytest.approx(8 * 12 * 6 * voxel_bits, rel=1e-6)
-    coarse = command(*words)  # at the scenario's 0.5 m: half of each outer voxel is solid, nothing is free
-    assert coarse.code in (0, 2) and coarse.err.count("\n") == (coarse.code == 2)
+from tests.baselines.ran import SHORT
 
 
 @pytest.fixture
@@ -152,17 +135,6 @@ def test_every_option_of_load_world_is_an_option_of_the_command():
     asked = Reading(height_m=1.0, negate=True, free_above=3.0, map_rule="nav2", hollow=True).options()
     assert asked == {"height_m": 1.0, "negate": True, "free_above": 3.0, "map_rule": "nav2", "fill": False}
     assert Reading().options() == {}
-
-
-@pytest.mark.parametrize(
-    "content", [b"", b"a text", b"# Octomap OcTree binary file\nid OcTree\nsize 9\nres 0.1\ndata\n"]
-)
-def test_a_file_that_is_no_octomap_is_refused(content, command, tmp_path):
-    pytest.importorskip("octomap")
-    path = tmp_path / "broken.bt"
-    path.write_bytes(content)
-    check_refused(command("box-7x11x5", "--world", str(path), "--json"), ["broken.bt"])
-    check_refused(command("box-7x11x5", "--world", str(tmp_path), "--json"), ["world"])
 
 
 def test_flying_robots_in_a_flat_plan_are_told_that_they_stay_in_its_plane(tmp_path, monkeypatch, capsys):

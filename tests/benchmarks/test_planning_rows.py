@@ -15,7 +15,6 @@ from benchmarks.planning import (
     crossing_row,
     maze,
     noise,
-    rooms,
     traversal_costs,
     voronoi_row,
 )
@@ -40,7 +39,6 @@ def test_rows_are_measured():
     shape = (90, 61, 1)
     for name, rates in (
         ("boxes", traversal_costs(cluttered(shape, 0.2))),
-        ("rooms", traversal_costs(rooms(shape))),
         ("a maze", traversal_costs(maze(shape))),
         ("noise", noise(shape)),
     ):
@@ -51,11 +49,11 @@ def test_rows_are_measured():
     assert crossing.unit == "ms" and crossing.goal == "< 50 ms" and crossing.ours > 0
 
 
-def test_all_of_a_maze_and_of_rooms_is_connected():
-    for covered in (rooms((90, 61, 1)), maze((91, 61, 1))):
-        free = np.flatnonzero(~covered)
-        reached = np.isfinite(dijkstra(cost_graph(traversal_costs(covered)), indices=int(free[0])))
-        assert reached[free].all() and 0.2 < covered.mean() + 0.2 < 0.8
+def test_all_of_a_maze_is_connected():
+    covered = maze((91, 61, 1))
+    free = np.flatnonzero(~covered)
+    reached = np.isfinite(dijkstra(cost_graph(traversal_costs(covered)), indices=int(free[0])))
+    assert reached[free].all() and 0.2 < covered.mean() < 0.8
 
 
 def test_wrong_costs_and_cells_are_found():

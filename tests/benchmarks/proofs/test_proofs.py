@@ -35,7 +35,7 @@ def test_cases_are_drawn_from_their_numbers_and_a_failed_one_is_played_again(sma
     assert main(["--first", "12", "--out", str(out)]) == 1
     said = capsys.readouterr()
     assert "python -m benchmarks.proofs squares --cases 1 --first 13" in said.err
-    assert "ValueError: unlucky number (test_proofs.py:" in said.err and "squares: 2 of 2" in said.err
+    assert "ValueError: unlucky number (test_proofs.py, line " in said.err and "squares: 2 of 2" in said.err
     assert "| squares | all | 2 | 1 | 144 squares, 1.5 s at most |" in said.out
     text = out.read_text("utf-8")
     assert "`python -m benchmarks.proofs squares --cases 1 --first 13`: ValueError: unlucky number" in text

@@ -15,11 +15,10 @@ from entropy_explore_env.errors import EntropyExploreError
 
 
 @pytest.mark.parametrize("kind", SAVED)
-@pytest.mark.parametrize("count", [60, pytest.param(2000, marks=pytest.mark.long)])
-def test_only_sound_files_and_named_errors(kind, count, tmp_path):
-    reads = read_saved(kind, tmp_path, count, 3)
+def test_only_sound_files_and_named_errors(kind, tmp_path):
+    reads = read_saved(kind, tmp_path, 60, 3)
     assert reads.wrong == []
-    assert 0 < reads.loaded < reads.files == count
+    assert 0 < reads.loaded < reads.files == 60
 
 
 @pytest.mark.parametrize("kind", SAVED)
