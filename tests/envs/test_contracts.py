@@ -115,17 +115,6 @@ def test_gymnasium_check_env(scenario: str, kind: str, parts: str) -> None:
     made.close()
 
 
-@pytest.mark.parametrize(("scenario", "kind", "parts"), params(*SINGLES))
-def test_gymnasium_passive_checker_has_nothing_to_say(scenario: str, kind: str, parts: str) -> None:
-    made = gymnasium.make(environment_id(scenario), max_cycles=5, **settings(1, kind, parts))
-    made.reset(seed=0)
-    over = False
-    while not over:
-        _, _, terminated, truncated, _ = made.step(made.action_space.sample())
-        over = terminated or truncated
-    made.close()
-
-
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("scenario", SMALL)
 def test_stable_baselines3_check_env(scenario: str, kind: str) -> None:

@@ -84,22 +84,6 @@ def test_the_mission_ends_for_all_robots_together_when_a_map_is_known() -> None:
     assert team.agents == [] and len(team.possible_agents) == 3
 
 
-@pytest.mark.parametrize(
-    ("settings", "end", "steps"),
-    [({"max_cycles": 7}, "CYCLES_UP", 7), ({"time_limit_s": 12.5}, "TIME_UP", 13)],
-)
-def test_limits_truncate(settings: dict[str, Any], end: str, steps: int) -> None:
-    """Steps last 1 s in the box, so 12.5 s are 13 steps, the last one half as long."""
-    results = played(parallel_env(BOX, **settings))
-    assert len(results) == steps
-    for _, _, terminations, truncations, _ in results[:-1]:
-        assert not any([*terminations.values(), *truncations.values()])
-    _, _, terminations, truncations, infos = results[-1]
-    assert not any(terminations.values()) and all(truncations.values())
-    assert {info["end"] for info in infos.values()} == {end}
-    assert infos["robot_0"]["time_s"] == settings.get("time_limit_s", 7.0)
-
-
 @pytest.mark.parametrize("kind", ["individual", "team"])
 def test_rewards_are_bits_gained_as_shares_of_all_bits(kind: str) -> None:
     """H(0) - H_th is V log2(30 / 0.03): every voxel of the box can be seen."""

@@ -84,29 +84,6 @@ def test_metres_seconds_and_bits_of_drives_by_hand() -> None:
     assert gained[0, 1] == received[0, 0] == 0.0 and sent[0, 1] == 384.0, "the slow one only announced"
 
 
-def test_metres_add_up_to_those_of_the_mission_also_where_drives_end_early() -> None:
-    settings = {"navigator": "planned", "max_speed_m_s": 0.5, "reach_m": 3.0}
-    sensor = {"scan_every_m": 0.3, "scan_time_s": 0.5}
-    team = parallel_env(
-        "room-furnished", robots=3, robot=settings, sensor=sensor, reward_function=weighed, max_cycles=200
-    )
-    team.reset(seed=1)
-    rng, ends, rests, sum_m = np.random.default_rng(2), set(), 0, np.zeros(3)
-    while team.agents:
-        actions = {a: rng.uniform(-1, 1, team.action_space(a).shape).astype(np.float32) for a in team.agents}
-        infos = team.step(actions)[-1]
-        ends |= {info["move_end"] for info in infos.values()}
-        driven_m = SEEN[-1].distance_m[0]
-        assert (driven_m >= -1e-9).all() and (driven_m <= 0.5 + 1e-9).all()
-        sum_m += driven_m
-        robots, time_s = team.missions.state.robots[0], float(team.missions.state.missions[0]["time_s"])
-        rest = time_s >= robots["ready_s"] - 0.5
-        np.testing.assert_allclose(sum_m[rest], robots["distance_m"][rest], rtol=1e-9)
-        assert (sum_m <= robots["distance_m"] + 1e-9).all()
-        rests += rest.sum()
-    assert rests > 20 and "SEEN" in ends
-
-
 def actions_of(step: int, shape: tuple[int, ...]) -> np.ndarray:
     return np.random.default_rng(step).uniform(-1, 1, shape).astype(np.float32)
 

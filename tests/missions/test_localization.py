@@ -208,10 +208,7 @@ def test_teammates_fuse_in_the_sender_s_frame_with_the_sender_s_covariance(chann
 
 @pytest.mark.parametrize("flat", [False, True])
 def test_errors_are_as_large_as_robots_hold_them_to_be(flat):
-    """Normalised squares of 150 missions' errors (NEES), of 3 numbers or 4: within 99.9 % of χ².
-
-    The robots begin in the middle of a large box: near its walls, which no estimate leaves, they know more.
-    """
+    """Normalised squares of 150 missions' errors far from walls, of 3 numbers or 4: within 99.9 % of χ²."""
     drift = {"xy_m_per_sqrt_m": 0.02, "z_m_per_sqrt_m": 0.03, "yaw_rad_per_sqrt_m": 0.01}
     drift |= {"yaw_rad_per_sqrt_rad": 0.02}
     scenario = free_box(

@@ -299,10 +299,7 @@ def test_a_place_on_a_face_that_rounding_takes_past_it_is_still_inside():
 
 
 def test_noise_that_grows_with_a_power_of_the_distance_is_in_scans_and_in_what_is_expected_of_them():
-    """Along one ray of length d, ζ dⁿ with n = 2 is what n = 1 gives with ζ d in place of ζ.
-
-    The robot scans backwards, and the panorama says what a ray ahead would bring, which is as long.
-    """
+    """Along one ray of length d, ζ dⁿ with n = 2 is what n = 1 gives with ζ d; the panorama's is as long."""
     told = []
     for exponent, slope in ((2.0, 0.03), (1.0, 0.03 * 1.75), (1.0, 0.03)):
         sensor = {"field_of_view_rad": (0.0, 0.0), "sigma_slope_per_m": slope, "sigma_exponent": exponent}

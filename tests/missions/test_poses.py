@@ -12,10 +12,7 @@ GRID = Grid((7, 11, 5), 0.5, (-1.0, 2.0, 0.5))
 
 
 def around_a_corner():
-    """2 m along y and 1.5 m along x at ½ m/s and ½ m/s², begun at 10 s: 1 s up, 6 s along, 1 s down.
-
-    It turns by 0.28 rad over the back, and by ½ rad up; at 18 s it begins to scan, for half a second.
-    """
+    """2 m along y, 1.5 m along x, from 10 s: 1 s up, 6 s along, 1 s down; it turns over the back; a scan."""
     robot = {"max_speed_m_s": 0.5, "acceleration_m_s2": 0.5, "turn_rate_rad_s": 0.1}
     missions = started(free_box(grid=GRID, robots=2, robot=robot))
     own = missions.state.robots[0, 0]

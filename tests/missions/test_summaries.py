@@ -114,11 +114,7 @@ def test_an_own_map_is_the_belief_without_the_prior_and_without_what_was_heard()
 def test_no_measurement_comes_twice_and_none_more_precise_than_it_was(
     seed, robots, channel, faults_and_drift, grid
 ):
-    """The joint map holds every measurement once, at the precision that its own robot gave it.
-
-    No robot's map is anywhere more precise than that. So what is more in it than in a robot's own
-    measurements is what the others measured, all their summaries together.
-    """
+    """No robot's map is anywhere more precise than the joint map, which holds each measurement once."""
     faults, drift = faults_and_drift
     missions = played(
         50,

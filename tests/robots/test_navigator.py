@@ -25,10 +25,7 @@ def planner(grid=FLAT, **robot):
 
 
 def plan(scenario, solid, start, goal, known=None, places=32, closed=None):
-    """Waypoints (N, 3) and the end of a plan through what is known, (X, Y, Z) bool; None = all.
-
-    `closed` (X, Y, Z) bool is where the body would reach above the ceiling.
-    """
+    """Waypoints (N, 3) and end of a plan through what is `known`; `closed` lies above the ceiling."""
     mean = solid.astype(np.float32).ravel()
     precision = np.full(mean.shape, KNOWN) if known is None else np.where(known.ravel(), KNOWN, PRIOR)
     points = np.full((places, 3), np.nan)
@@ -143,10 +140,7 @@ def test_planar_robots_keep_their_height_and_may_pass_under_what_is_above_them()
 @pytest.mark.parametrize(("radius", "closed_from", "below"), [(0.2, 3, [4]), (0.4, 4, [3, 4, 5])])
 @pytest.mark.parametrize("cliff", [1, 5])
 def test_planners_know_the_ceiling_and_of_the_ground_what_was_seen(radius, closed_from, below, cliff):
-    """At x = 4 the ceiling leaves what is below layer 3 to the body; a cliff at x = 6 is unknown.
-
-    Even where it is higher than the ceiling beside it, it changes nothing in the plan.
-    """
+    """At x = 4 the body must pass below layer 3; an unknown cliff at x = 6 changes nothing in the plan."""
     grid, solid = Grid((9, 7, 6), 0.5), np.zeros((9, 7, 6), bool)
     solid[:, :, 0] = True
     believed, ceiling = solid.copy(), np.full(grid.shape[:2], 6, np.int32)

@@ -227,10 +227,7 @@ def test_what_is_no_covariance_becomes_one(seed):
 
 
 def test_the_last_of_an_uncertainty_is_no_negative_one():
-    """Of 200 m to 10 nm and better: nothing of it is left in the last digits, but what rounding leaves.
-
-    A robot whose wheels slip does not know where it is any more, and sees landmarks on two sides.
-    """
+    """Wheels slip, landmarks are sighted to 10 nm: of 200 m nothing is left but what rounding leaves."""
     rng = np.random.default_rng(0)
     estimate = estimate_at()
     rates = drift(xy_per_m=1e4)

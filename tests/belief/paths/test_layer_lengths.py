@@ -82,11 +82,7 @@ def test_a_search_that_ends_at_its_targets_knows_their_lengths(seed, count):
 
 
 def test_a_path_through_two_doors_by_hand():
-    """Walls at x = 2 and x = 5 with doors at y = 0 and y = 4: no step cuts a corner of a door.
-
-    From (0, 2): one diagonal and one straight step to (1, 0), three through the door to (4, 0), along the
-    wall to (4, 4), and two through the second one.
-    """
+    """Walls at x = 2 and 5, doors at y = 0 and 4, from (0, 2): no step cuts a corner of a door."""
     field = np.ones((8, 5, 1), np.float32)
     field[2, 1:], field[5, :4] = math.inf, math.inf
     goals = [np.ravel_multi_index(at, field.shape) for at in ((3, 0, 0), (4, 4, 0), (6, 4, 0), (2, 3, 0))]

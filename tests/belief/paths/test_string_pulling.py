@@ -12,11 +12,9 @@ from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.belief.paths.string_pulling import line_of_sight_cost, string_pulled
 from tests.belief.paths.graphs import field_costs, shortest_path
-from tests.reference.scenes import SHAPES, drawn, flat_index, random_cover, seeds
+from tests.reference.scenes import SHAPES, drawn, random_cover, seeds
 
 SIZE = (7, 11, 5)
-FLAT = (9, 6, 1)
-SQRT2 = math.sqrt(2.0)
 
 
 def sight(rates, start, finish):
@@ -158,40 +156,6 @@ def test_a_pulled_path_is_free_costs_no_more_and_turns_on_the_path(shape, seed, 
         assert all(tuple(point) in centres for point in points[1:-1].tolist())
         np.testing.assert_array_equal(points[-1], (given_ends or (0, centre(goal, shape)))[1])
         assert all(math.dist(a, b) > 0.0 for a, b in itertools.pairwise(points))
-
-
-def test_around_the_end_of_a_wall_in_three_legs():
-    """Wall x = 4, y < 4: up to beside its end, past it, and down again."""
-    covered = np.zeros(FLAT, np.float32)
-    covered[4, :4] = 1.0
-    known = np.full(FLAT, 50.0, np.float32)
-    start, goal = flat_index([(0, 0, 0), (8, 0, 0)], FLAT)
-    cost, path, points, legs = pulled(covered, known, start, goal)
-    assert cost == pytest.approx(2 * (3 * SQRT2 + 1) + 2)
-    assert points.tolist() == [[0.5, 0.5, 0.5], [3.5, 4.5, 0.5], [5.5, 4.5, 0.5], [8.5, 0.5, 0.5]]
-    assert sum(legs) == pytest.approx(2 * 5 + 2)
-    assert len(path) == 11
-
-
-def test_unknown_space_is_not_cut_across_where_that_costs_more():
-    """A detour around expensive unknown space stays; where it is cheap the path is straight."""
-    mean, precision = np.zeros(FLAT, np.float32), np.full(FLAT, 50.0, np.float32)
-    precision[2:7, :4] = 1e-3
-    start, goal = flat_index([(0, 3, 0), (8, 3, 0)], FLAT)
-    assert len(pulled(mean, precision, start, goal, unknown_cost=1.0)[2]) == 2
-    points = pulled(mean, precision, start, goal, unknown_cost=8.0)[2]
-    assert points is not None and len(points) == 4
-    assert points is not None and (points[1:-1, 1] == 4.5).all()
-
-
-def test_planar_bodies_keep_the_height_of_their_start():
-    mean, precision = np.zeros(SIZE, np.float32), np.full(SIZE, 50.0, np.float32)
-    mean[3, :9, 2] = 1.0
-    start, goal = flat_index([(0, 0, 2), (6, 0, 2)], SIZE)
-    ends = (np.array([0.4, 0.6, 2.2]), np.array([6.5, 0.5, 2.2]))
-    points = pulled(mean, precision, start, goal, layer=2, ends=ends)[2]
-    assert points is not None and len(points) > 2
-    assert points is not None and (points[:, 2] == 2.2).all()
 
 
 def test_a_body_at_the_goal_does_not_drive():
