@@ -108,7 +108,6 @@ def test_convert_keeps_the_world(tmp_path, capsys):
     [
         [],
         ["draw"],
-        ["show", "room-furnished"],
         ["show", "room-furnished", "--out", "world.jpg"],
         ["show", "room-furnished", "--out", "world.png", "--voxel-size-m", "0.1"],
         ["show", "room-furnished", "--out", "world.png", "--seed", "-1"],
