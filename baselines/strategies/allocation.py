@@ -5,17 +5,15 @@
     coordinated    1 - Σ P(d) - β·length, with P(d) = 1 - d/range within the range of a frontier that another
                    robot goes to, and β = 0.01 (Burgard et al. 2005, eqs. 5-7, who find 0.01 … 50 alike)
 
-All else is as in per-time visibility: so they compare metrics, and are not the rules of those papers as their
-authors run them, which are `nearest-frontier` and `coordinated-frontier`.
+The rules of the last two papers as their authors run them are `nearest-frontier` and `coordinated-frontier`.
 
 The pair of a robot and a candidate with the greatest value is allocated first (Sawhney 2009, sect. 3.2). The
 points that are seen from there count as promised, and the next pair is chosen by what remains. Asynchronously
-only stopped robots take part, and the promises of robots under way hold until they have scanned;
-synchronously all robots wait for each other and take part together. Each robot allocates by its own belief
-and the messages that reached it: it simulates the choices of the others, and makes its own. With perfect
-messages that is the paper's central procedure. Teammates of another kind are assumed to have the robot's own
-sensor and body. A robot counts as stopped if it was heard since it announced its latest viewpoint, that is,
-its scan arrived; or if nothing was heard of it for longer than any drive takes.
+only stopped robots take part, and the promises of others hold until they have scanned; synchronously all
+wait for each other. Each robot allocates by its own belief and the messages that reached it: with perfect
+messages that is the paper's central procedure. Teammates are assumed to have the robot's own sensor and body.
+A robot counts as stopped if it was heard since it announced its latest viewpoint, that is, its scan arrived;
+or if nothing was heard of it for longer than any drive takes.
 """
 
 from __future__ import annotations

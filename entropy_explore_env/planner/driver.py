@@ -1,20 +1,15 @@
 """From where a rule sends a robot to what the robot does: the one place where robots get out of trouble.
 
-A rule says where a robot goes by what it knows, and the driver does what no formula says:
-
 - A robot that a teammate stopped waits for one scan if its number is the lower one. Otherwise, or if it is
-  stopped again, it steps aside to a random viewpoint. If that happened twice in a row, it makes room: for
-  some decisions it goes to places that it reaches sooner than its teammates do.
-- A robot that is blocked by what does not move is told so, since the same drive would end there again; after
-  a number of such drives in a row it goes to a random viewpoint.
-- A robot to which its rule gives no viewpoint goes to random ones, each until its drive has ended.
-- A robot that would take the same scan again, although the latest one brought nothing, goes to a random
-  viewpoint.
-- A robot that drifts backs off. It is wrong about its place, and so is its map: it may believe in a free
-  path for ever, or for ever expect a scan to bring what it does not bring. Where it was blocked twice in a
-  row, or chooses the place again to which it was blocked, it drives a few voxels in a random direction that
-  leads away from there, once more with each further block. One that stayed at the same place for many
-  decisions goes to a random viewpoint.
+  stopped again, it steps aside to a random viewpoint, and after two of these it makes room: for some
+  decisions it goes to places that it reaches sooner than its teammates do.
+- A robot that is blocked by what does not move is told so, and goes to a random viewpoint after a number of
+  such drives in a row.
+- A robot goes to a random viewpoint, too, where its rule gives none, until that drive has ended, and where it
+  would take the same scan again although the latest one brought nothing.
+- A robot that drifts is wrong about its place, and so is its map. Blocked twice in a row, or sent again to
+  where it was blocked, it drives a few voxels in a random direction that leads away from there, once more
+  with each further block. After many decisions at the same place it goes to a random viewpoint.
 
 A rule overrides one of the methods `give_way`, `make_room` and `note_blocked` where its paper says what a
 robot does.

@@ -1,23 +1,16 @@
 """Rules that go on short open tours: `tour`, and how `planned-rate` explores plans that are to be seen whole.
 
 `tour` is in the manner of TARE (Cao et al. 2021). Within a horizon of the robot, few frontier cells are
-chosen from which all frontier cells there can be seen close enough: in turn, the one that covers most that is
-not covered yet (greedy set cover, as there). Beyond the horizon, frontier cells are put together by coarse
-cells of the map; the nearest one stands for its coarse cell. The robot goes to the first place of a short
-open tour from where it is through all of these. The tour minimises the length of shortest paths between all
-of its places. (Lengths along the tree of paths from the robot make it a quarter longer.) TARE solves the two
-levels one after the other and takes the first solution of OR-Tools; here both are one tour, built by
-insertion and improved by 2-opt and Or-opt moves (`open_tours`). Ours: the place chosen last stays the first
-unless that makes the tour longer by more than a share.
+chosen from which all frontier cells there can be seen close enough (greedy set cover, as there); beyond it,
+the nearest cell stands for each coarse cell of the map. The robot goes to the first place of a short open
+tour of shortest paths through all of these (`open_tours`). TARE solves the two levels one after the other.
+Ours: the place chosen last stays the first unless that makes the tour longer by more than a share.
 
 `SharedTour` plans through the frontier cells that are nearer to the robot, by its paths, than to where
-teammates go, by the straight line; where there is none, through all of them. A tour does not leave behind
-what it would have to come back for: in plans it drives shorter paths than rules that choose one frontier cell
-at a time. A dead end is a frontier of few connected voxels: little lies behind it, and the robot need not
-drive to it. It drives to a place from which all that is unknown around the frontier cell is in sight, the one
-that makes the path over it to the tour's next place shortest, if that is shorter than over the cell. Where
-the look leaves the cell a frontier, the robot goes on to it. To an opening it drives at once, since what lies
-behind has to be explored from there.
+teammates go, by the straight line; where there is none, through all of them. To a dead end, a frontier of few
+connected voxels behind which little lies, the robot need not drive: it looks into it from the place that
+makes the path over it to the tour's next place shortest, if that is shorter than over the cell, and goes on
+to the cell where the look leaves it a frontier.
 
 Tuned: `near`, `cover`, `opening` and `view`, see docs/explorers.md.
 """

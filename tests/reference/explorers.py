@@ -62,15 +62,22 @@ def nearest_frontier(plan: np.ndarray, robot: Cell) -> dict[Cell, float]:
     return {cell: -lengths[cell] for cell in frontier_cells(plan) if math.isfinite(lengths[cell])}
 
 
-def distance_advantage(plan: np.ndarray, robot: Cell, radius: int, horizon: float) -> dict[Cell, float]:
+def distance_advantage(
+    plan: np.ndarray, robot: Cell, radius: int, horizon: float, block: int = 1
+) -> dict[Cell, float]:
     """Frontier cell within the horizon → its distance advantage; if there is none, as `nearest_frontier`.
 
-    The free cells u are those that the robot can reach, at most `radius` off along either axis.
+    The free cells u are those that the robot can reach, at most `radius` off along either axis. Of the
+    frontier cells of a block, so many cells wide, the nearest one counts.
     """
     lengths = lengths_from(plan, robot)
     near = [cell for cell in frontier_cells(plan) if lengths[cell] <= horizon and lengths[cell] < math.inf]
     if not near:
         return nearest_frontier(plan, robot)
+    nearest: dict[Cell, Cell] = {}
+    for cell in sorted(near, key=lambda cell: float(lengths[cell])):
+        nearest.setdefault((cell[0] // block, cell[1] // block), cell)
+    near = sorted(nearest.values())
     x, y = np.indices(plan.shape)
     around = (abs(x - robot[0]) <= radius) & (abs(y - robot[1]) <= radius) & np.isfinite(lengths)
     means = [float(field[around].mean()) for field in lengths_from_all(plan, near)]

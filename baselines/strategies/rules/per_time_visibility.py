@@ -2,21 +2,17 @@
 
     v* = argmax over candidates v of V(v)/t(v)
 
-or by another metric (`metrics`). V is what v is expected to show and no robot has promised to see;
-t is the time of the drive to v and of the scan there. Over terrain V is multiplied by
-(z_f - z_av)^γ z_f^(1 - γ) (sect. 3.3). V is in m² of plan or ground (in 3-D without an exposure surface m³;
-over terrain with the height factor m³, heights in metres), t in seconds. A robot drives to its candidate
-before it chooses again; which robot gets which candidate is in `allocation`.
+or by another metric; that, and which robot gets which candidate, is in `allocation`. V is what v is expected
+to show and no robot has promised to see, in m² of plan or ground (in 3-D without an exposure surface m³); t
+is the time of the drive to v and of the scan there, in seconds, without stops on the path. Over terrain V is
+multiplied by (z_f - z_av)^γ z_f^(1 - γ) (sect. 3.3), heights in metres. A robot drives to its candidate
+before it chooses again.
 
-Ours, where the paper says nothing:
-
-- There is one candidate per block of the map.
-- A place from which a robot has scanned is no longer its candidate, so that slivers which its rays miss do
-  not stop it.
-- A robot without candidates waits and scans while teammates are under way, and makes room for one whose
-  body touches its own. Then a finer σ counts as explored, unless robots explore only once.
-- t does not include stops on the path, and robots first promise to see what is visible from there.
-- V is counted all around; a sensor that looks one way is turned to where most of it lies.
+Ours, where the paper says nothing: there is one candidate per block of the map, and none where the robot has
+scanned, so that slivers which its rays miss do not stop it. A robot without candidates waits and scans while
+teammates are under way, and makes room for one whose body touches its own; then a finer σ counts as explored,
+unless robots explore only once. V is counted all around; a sensor that looks one way is turned to where most
+of it lies.
 """
 
 from __future__ import annotations

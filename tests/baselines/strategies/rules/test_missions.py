@@ -20,6 +20,7 @@ from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
 from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import find_scenario
 from tests.planner.scenes import small_plan, varied
 from tests.reference import explorers as reference
@@ -99,6 +100,42 @@ def test_over_thirty_starts_paths_are_as_long_as_the_textbooks(rule):
     logs = np.log(ratios(rule, range(30)))
     error = logs.std(ddof=1) / math.sqrt(len(logs)) if rule in ("tour", "receding-horizon") else 0.0
     assert abs(logs.mean()) < math.log(1.03) + 2.0 * error
+
+
+def office(scan_every_m):
+    """An office of 40 × 32 m for a point robot with a lidar of 4.5 m, until every free cell was seen."""
+    settings = {
+        "grid": Grid((160, 128, 1), 0.25),
+        "robots": 1,
+        "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "redecide": "on_scan"},
+        "sensor": {"max_range_m": 4.5, "angular_step_rad": math.pi / 180, "scan_every_m": scan_every_m},
+        "ending": {"unseen_free_voxels": 0, "time_limit_s": 1e4},
+    }
+    return with_settings(scripted(find_scenario("office")), settings)
+
+
+OFFICE_RULES = {
+    "nearest-frontier": (0.375, reference.nearest_frontier),
+    "distance-advantage": (0.5, partial(reference.distance_advantage, radius=60, horizon=61.0, block=4)),
+}
+"""Name → metres between decisions, and the textbook's rule."""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("rule", OFFICE_RULES)
+def test_in_offices_paths_are_no_longer_than_the_textbooks(rule):
+    """In 152 × 64 m, too, where it takes hours: see docs/explorers.md."""
+    scan_every_m, values = OFFICE_RULES[rule]
+    env, logs = EntropyExploreEnv(office(scan_every_m)), []
+    for seed in range(3):
+        driven_m = []
+        for strategy in (make_strategy(rule), reference.Textbook(values)):
+            run_mission(env, strategy, seed)
+            figures = mission_figures(env.missions, 0)
+            assert figures["finished"]
+            driven_m.append(figures["distance_m"])
+        logs.append(math.log(driven_m[0] / driven_m[1]))
+    assert sum(logs) / 3 < math.log(1.02)
 
 
 @pytest.mark.parametrize("name", NAMES)
