@@ -32,7 +32,7 @@ class Page:
         template: Its file.
         figures: Name → what draws it.
         tables: Name → what gives its Markdown.
-        values: Name → what stands in the text; numbers are shown with four digits.
+        values: Name → what stands in the text.
         texts: What the template may use by name.
     """
 
@@ -61,8 +61,8 @@ class Page:
         def table(wanted: str) -> str:
             return _found("table", wanted, self.tables)().strip()
 
-        def value(wanted: str, form: str = "") -> str:
-            return format(_found("value", wanted, self.values), form)
+        def value(wanted: str) -> str:
+            return str(_found("value", wanted, self.values))
 
         text = self._rendered(figure=figure, table=table, value=value, **self.texts)
         write_atomically(folder / f"{name}.md", text.strip() + "\n")

@@ -14,7 +14,7 @@ from baselines.cli.figures import COLOURS
 from baselines.experiments.experiment import Records
 from baselines.experiments.plots import one_axes
 from baselines.papers.bhattacharya.claims import exploring, first_floor
-from baselines.papers.bhattacharya.measured import SHAPE, robot_cells, split, unknown_region
+from baselines.papers.bhattacharya.measured import ROBOTS, SHAPE, split, unknown_region
 from baselines.papers.bhattacharya.run import Run, start_cells, unpacked
 from baselines.papers.bhattacharya.sweep import FLOORS, VARIANTS, all_runs, coverage_id, exploration_id
 from entropy_explore_env.belief.paths.geodesic_cells import new_tessellation, tessellate
@@ -112,7 +112,7 @@ def figure_4(records: Records) -> Figure:
         picture[region.T] *= 0.75
         axes.imshow(picture, origin="lower", interpolation="nearest")
         axes.contour(found.cells.T, levels=[0.5], colors="black", linewidths=1.2)
-        for robot, (x, y) in enumerate(robot_cells()):
+        for robot, (x, y) in enumerate(ROBOTS):
             axes.plot(x, y, marker="o", color=COLOURS[robot], markeredgecolor="black")
         _bare(axes, f"{title}: unexplored areas {found.ratio:.2f} : 1")
     figure.suptitle("Fig. 4: an unknown band nearer to the second robot (darker)", x=0.01, ha="left")

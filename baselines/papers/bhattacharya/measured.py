@@ -29,11 +29,10 @@ from entropy_explore_env.belief.paths.geodesic_cells import (
 
 SHAPE = (200, 121, 1)
 ETAS = (1e-4, 1e-3, 1e-2, 3e-2, 1e-1, 1.0)
-REGIONS = {
-    "band": "a band from wall to wall, which separates the robots",
-    "patch": "a patch with free space around it",
-}
-_ROBOTS = ((20, 60), (180, 60))
+REGIONS = ("band", "patch")
+"""A band from wall to wall, which separates the robots; a patch with free space around it."""
+ROBOTS = ((20, 60), (180, 60))
+"""Cells of the robots."""
 _BAND = (90, 170)
 """Nearer to the second robot."""
 
@@ -62,18 +61,13 @@ def split(name: str, eta: float | None) -> Split:
         eta: η of the entropy-weighted cells; None = plain geodesic cells.
     """
     region, space = unknown_region(name), new_tessellation(SHAPE)
-    sources = np.array([x * SHAPE[1] + y for x, y in _ROBOTS])
+    sources = np.array([x * SHAPE[1] + y for x, y in ROBOTS])
     if eta is None:
         tessellate(space, np.ones(SHAPE, np.float32), sources)
     else:
         tessellate(space, np.where(region, LN2, 0.0).astype(np.float32), sources, eta, by_length=False)
     areas = [int(np.count_nonzero((space.cells == robot) & region)) for robot in range(2)]
     return Split(space.cells[:, :, 0].copy(), areas[0] / max(areas[1], 1))
-
-
-def robot_cells() -> np.ndarray:
-    """Return (2, 2) where the robots are."""
-    return np.array(_ROBOTS)
 
 
 def ratios() -> dict[str, Any]:
@@ -84,13 +78,11 @@ def ratios() -> dict[str, Any]:
     }
 
 
-def cost_graph(costs_per_cell: np.ndarray, length_cost: float = 0.0, by_length: bool = True) -> csr_matrix:
+def cost_graph(costs_per_cell: np.ndarray) -> csr_matrix:
     """Return (V, V) what steps between the cells of a plan cost, as `tessellate` has it; none past a corner.
 
     Args:
         costs_per_cell: (X, Y, 1) float32, traversal cost of a cell; inf = impassable.
-        length_cost: Cost of a voxel edge of path in addition.
-        by_length: Whether diagonal steps pay the costs_per_cell of their whole length.
     """
     size_x, size_y, _ = costs_per_cell.shape
     plane = costs_per_cell[:, :, 0].astype(np.float64)
@@ -108,7 +100,7 @@ def cost_graph(costs_per_cell: np.ndarray, length_cost: float = 0.0, by_length: 
         mean = 0.5 * (moved(plane, x, y, (0, 0))[legal] + moved(plane, x, y, (x, y))[legal])
         rows.append(moved(numbers, x, y, (0, 0))[legal])
         columns.append(moved(numbers, x, y, (x, y))[legal])
-        costs.append(mean * (length if by_length else 1.0) + length_cost * length)
+        costs.append(mean * length)
     ends = (np.concatenate(rows), np.concatenate(columns))
     return csr_matrix((np.concatenate(costs), ends), shape=(costs_per_cell.size, costs_per_cell.size))
 

@@ -64,7 +64,6 @@ class Floor:
         middle: Sensor range of the variants, in cells.
         ranges: Those of the paper's settings; the paper gives none.
         variants: What is run there besides.
-        text: What it is.
     """
 
     shape: tuple[int, int]
@@ -74,26 +73,16 @@ class Floor:
     middle: float
     ranges: tuple[float, ...]
     variants: tuple[str, ...]
-    text: str
 
 
 FLOORS = {
-    "wide": Floor((1000, 783), 0.1 / 3.0, 25_000, 2750, 100.0, (100.0,), (), "rooms 210-540 cells wide"),
-    "narrow": Floor(
-        (1000, 783), 0.1, 25_000, 2750, 100.0, (), ("nearest-length",), "rooms 70-180 cells wide"
-    ),
-    "small": Floor(
-        (333, 261),
-        0.1,
-        4000,
-        917,
-        35.0,
-        (17.0, 35.0, 70.0, 140.0, 433.0),
-        tuple(VARIANTS),
-        "the wide plans in cells three times as large",
-    ),
+    "wide": Floor((1000, 783), 0.1 / 3.0, 25_000, 2750, 100.0, (100.0,), ()),
+    "narrow": Floor((1000, 783), 0.1, 25_000, 2750, 100.0, (), ("nearest-length",)),
+    "small": Floor((333, 261), 0.1, 4000, 917, 35.0, (17.0, 35.0, 70.0, 140.0, 433.0), tuple(VARIANTS)),
 }
-"""The largest range looks over the whole plan. There is time to run many small plans, and few others."""
+"""Rooms of wide plans are 210-540 cells wide, of narrow ones 70-180; small plans are the wide ones in cells
+three times as large. The largest range looks over the whole plan. There is time to run many small plans, and
+few others."""
 
 
 def coverage_id(control: str, starts: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import pairwise, product
-from typing import NamedTuple
 
 import numpy as np
 
@@ -180,15 +179,8 @@ def bits_sent(records: Records, cell: str) -> np.ndarray:
     return sample(records, cell, "bits_sent") / 1e6
 
 
-class SteeredRatio(NamedTuple):
-    """Time with a steered I_min over that with a fixed one, and where on the steered curve it was read."""
-
-    ratio: Interval
-    read_at: str
-
-
-def steered_ratio(records: Records, robots: int, i_min_bits: float) -> SteeredRatio:
-    """Return the time with a steered I_min over that with a fixed one, read at the bits of the latter."""
+def steered_ratio(records: Records, robots: int, i_min_bits: float) -> tuple[Interval, str]:
+    """Return the time with a steered I_min over that with a fixed one, and at which bits it was read."""
     steered = [cell for fill in FILLS if (cell := sharing_id(robots, fill=fill)) in records]
     fixed = sharing_id(robots, i_min_bits)
     times = np.stack([sample(records, cell) for cell in steered])
@@ -197,7 +189,7 @@ def steered_ratio(records: Records, robots: int, i_min_bits: float) -> SteeredRa
     means = sent.mean(axis=1)
     inside = means.min() <= there.mean() <= means.max()
     beyond = "" if inside else ", beyond its fills: the nearest one"
-    return SteeredRatio(ratio, f"{there.mean():.2f} Mbit{beyond}")
+    return ratio, f"{there.mean():.2f} Mbit{beyond}"
 
 
 def teams_table(records: Records) -> str:
