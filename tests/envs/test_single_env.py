@@ -9,15 +9,11 @@ import pytest
 from entropy_explore_env import CallOrderError, SettingError, SingleRobotEnv, environment_id, parallel_env
 from entropy_explore_env.envs.conformance import leaves, require_same
 from tests.envs.pairwise import pairwise
+from tests.envs.test_vector_env import some_actions
 from tests.reference.scenes import SMALL
 
 BOX = "box-7x11x5"
 KINDS = ("continuous", "discrete")
-
-
-def random_actions(env: gymnasium.Env[Any, Any], count: int, seed: int = 0) -> list[Any]:
-    env.action_space.seed(seed)
-    return [env.action_space.sample() for _ in range(count)]
 
 
 @pytest.mark.parametrize("scenario", SMALL)
@@ -27,7 +23,7 @@ def test_gymnasium_makes_a_robot_that_waits_for_nobody(scenario: str) -> None:
     assert env.unwrapped.scenario.robots == 1
     assert env.unwrapped.scenario.decision_period_s is None
     assert env.reset(seed=0)[1]["deciding"]
-    for action in random_actions(env, 20):
+    for action in some_actions(env, 20):
         *_, truncated, info = env.step(action)
         assert info["deciding"]
     assert truncated
@@ -45,7 +41,7 @@ def test_plays_the_same_as_a_team_of_one(scenario: str, kind: str, period: float
     for seed in (3, None):
         expected = [part["robot_0"] for part in team.reset(seed=seed)]
         require_same("reset", leaves(expected), leaves(list(env.reset(seed=seed))))
-        for action in random_actions(env, 30):
+        for action in some_actions(env, 30):
             expected = [part["robot_0"] for part in team.step({"robot_0": action})]
             require_same("step", leaves(expected), leaves(list(env.step(action))))
         assert team.agents == []

@@ -28,7 +28,7 @@ UNEVEN: dict[str, Any] = {"decision_period_s": None, "time_limit_s": 20.0}
 ROBOT_INFOS = ("deciding", "entropy_bits", "own_bits", "received_bits", "reward_robots")
 
 
-def some_actions(env: EntropyExploreVectorEnv, steps: int, seed: int = 0) -> list[Any]:
+def some_actions(env: Any, steps: int, seed: int = 0) -> list[Any]:
     env.action_space.seed(seed)
     return [env.action_space.sample() for _ in range(steps)]
 

@@ -4,8 +4,6 @@ import hashlib
 import json
 import pickle
 import shutil
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -90,40 +88,39 @@ def test_the_latest_two_of_a_kind_stay_and_the_latest_is_taken(tmp_path):
         latest_checkpoint(tmp_path / "nowhere", "best")
 
 
-def spoil(folder: Path, what: str) -> None:
-    head, weights = folder / "policy.json", folder / "policy.safetensors"
-    if what == "missing":
-        weights.unlink()
-    elif what == "truncated":
-        weights.write_bytes(weights.read_bytes()[:-7])
-    elif what == "no head":
-        head.unlink()
-    elif what == "broken head":
-        head.write_bytes(b"\xff{" * 9)
-    elif what == "foreign":
-        head.write_text('["something else"]')
-    elif what == "pickled":
-        (folder / "normalisation.npz").write_bytes(pickle.dumps([1]))
-    else:
-        content = json.loads(head.read_text())
-        changes: dict[str, Any] = {
-            "format": {"format": 99},
-            "features": {"features": "magic"},
-            "hidden": {"hidden": [0]},
-            "scenario": {"scenario": {"name": 3}},
-            "digests": {"sha256": None},
-        }
-        head.write_text(json.dumps(content | changes[what]))
+def spoil(name, change):
+    """Change the bytes of a file of a checkpoint; None = it goes."""
+
+    def spoilt(folder):
+        file = folder / name
+        file.unlink() if change is None else file.write_bytes(change(file.read_bytes()))
+
+    return spoilt
 
 
-@pytest.mark.parametrize(
-    "what",
-    "missing,truncated,no head,broken head,foreign,pickled,format,features,hidden,scenario,digests".split(
-        ","
-    ),
-)
+def heading(**changes):
+    """Change what the head says."""
+    return spoil("policy.json", lambda head: json.dumps(json.loads(head) | changes).encode())
+
+
+SPOILT = {
+    "missing": spoil("policy.safetensors", None),
+    "truncated": spoil("policy.safetensors", lambda content: content[:-7]),
+    "no head": spoil("policy.json", None),
+    "broken head": spoil("policy.json", lambda _: b"\xff{" * 9),
+    "foreign": spoil("policy.json", lambda _: b'["something else"]'),
+    "pickled": spoil("normalisation.npz", lambda _: pickle.dumps([1])),
+    "format": heading(format=99),
+    "features": heading(features="magic"),
+    "hidden": heading(hidden=[0]),
+    "scenario": heading(scenario={"name": 3}),
+    "digests": heading(sha256=None),
+}
+
+
+@pytest.mark.parametrize("what", SPOILT)
 def test_what_is_broken_or_foreign_is_named(saved, what, capsys):
-    spoil(saved, what)
+    SPOILT[what](saved)
     with pytest.raises(CheckpointError):
         LearnedPolicy(saved)
     words = ["box-7x11x5", "--robots", "2", "--strategy", str(saved.parent)]
