@@ -73,7 +73,7 @@ class Args(TrialOptions):
     )
 
     suite: str | None = None
-    """Pinned worlds and starts: plans, volumes, teams, others or faults."""
+    """Pinned worlds and starts: plans, volumes, teams, others, c2 or faults."""
     scenarios: str | None = None
     """Named scenarios, separated by commas, in place of a suite; options of the task change each of them.
     Default: room,room-furnished,lab,office,cave, or the scenario in --settings. With --world alone every

@@ -35,6 +35,8 @@ class Reading:
     """Meshes: a building drawn by its inner walls, free inside and solid outside."""
     scale: float | None = None
     """Meshes and point clouds: metres of a unit, 0.001 for millimetres."""
+    gap_m: float | None = None
+    """Point clouds: gaps between points up to this width are solid."""
     up: Literal["y", "z"] | None = None
     """Meshes and point clouds: the axis that points up."""
     read_limit_s: float | None = None

@@ -48,6 +48,7 @@ class Family(Enum):
 _EVERYWHERE = ("plans", "volumes", "teams", "others")
 _NAMED_SUITES = ("plans", "volumes", "teams")
 _TEAM_SUITES = ("volumes", "teams")
+_C2 = ("c2",)
 
 
 @dataclass(frozen=True)
@@ -134,17 +135,17 @@ _PAPER = (
         PerTimeVisibility,
         "argmax V/t over frontier candidates; over terrain V/t (z_f - z_av)^γ z_f^(1-γ); points promised to "
         "n others weigh 1/n (Sawhney)",
-        _EVERYWHERE,
+        _EVERYWHERE + _C2,
     ),
 )
 _FRONTIER = (
-    Entry("nearest-frontier", NearestFrontier, "argmin d(r, v) (Yamauchi 1997)", _EVERYWHERE),
+    Entry("nearest-frontier", NearestFrontier, "argmin d(r, v) (Yamauchi 1997)", _EVERYWHERE + _C2),
     Entry(
         "coordinated-frontier",
         CoordinatedFrontier,
         "argmax U(v) - β d(r, v)/R, U(v) = 1 - Σ max(1 - |v - t|/R, 0) over teammates' targets t, R the "
         "sensor's range (Burgard 2005)",
-        _TEAM_SUITES,
+        _TEAM_SUITES + _C2,
     ),
     Entry(
         "assigned-frontier",
@@ -165,7 +166,7 @@ _FRONTIER = (
         DistanceAdvantage,
         "argmax mean over u of d(u, v) - d(r, v), u the free cells around the robot (Ericson, Pedro & "
         "Jensfelt 2025)",
-        _NAMED_SUITES,
+        _NAMED_SUITES + _C2,
     ),
     Entry(
         "receding-horizon",
@@ -177,7 +178,7 @@ _FRONTIER = (
         "tour",
         Tour,
         "first place of a short open tour through near viewpoints and far regions (after TARE, Cao 2021)",
-        _NAMED_SUITES,
+        _NAMED_SUITES + _C2,
     ),
 )
 _OWN = (
@@ -186,7 +187,7 @@ _OWN = (
         PlannedRate,
         "argmax of expected bits for their time, over viewpoints nearby and far places on planned paths; "
         "ground robots that explore a plan until all is seen follow short tours through frontier cells",
-        _EVERYWHERE,
+        _EVERYWHERE + _C2,
     ),
     Entry(
         "pretrained:plans",

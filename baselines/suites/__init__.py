@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from baselines.strategies.table import suite_names
-from baselines.suites import faults, scoreboard
+from baselines.suites import c2, faults, scoreboard
 from baselines.suites.suite import PATH, TIME_99, Suite
 from entropy_explore_env.errors import SettingError, one_of
 
@@ -30,6 +30,9 @@ SUITES: dict[str, Callable[[bool], Suite]] = {
     "others": lambda quick: Suite(
         "others", "Other scenarios, as they stand", scoreboard.other_tasks(quick), suite_names("others")
     ),
+    "c2": lambda quick: Suite(
+        "c2", "C²-Explorer's buildings", c2.tasks(quick), suite_names("c2"), c2.MEASURES
+    ),
     "faults": lambda quick: Suite(
         "faults",
         "Teams whose robots and messages fail",
@@ -39,7 +42,7 @@ SUITES: dict[str, Callable[[bool], Suite]] = {
     ),
 }
 """Name → what makes the suite, quick or whole, with the strategies of its table."""
-SCOREBOARD = ("plans", "volumes", "teams", "others")
+SCOREBOARD = ("plans", "volumes", "teams", "others", "c2")
 """Suites that stand on one page; the other one has a page of its own."""
 
 

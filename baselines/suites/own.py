@@ -55,6 +55,7 @@ _READ_BY_SOME = {
     "hollow": _MESHES,
     "inside": _MESHES,
     "scale": (*_MESHES, *_CLOUDS),
+    "gap_m": _CLOUDS,
     "up": (*_MESHES, *_CLOUDS),
 }
 """Option of reading → the files that it is for; of several files the others are read without it."""

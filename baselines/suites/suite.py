@@ -131,7 +131,7 @@ class Suite:
     """Tasks and the strategies that run them.
 
     Attributes:
-        name: `plans`, `volumes`, `teams`, `others`, `faults`, or `own` for scenarios of one's own.
+        name: `plans`, `volumes`, `teams`, `others`, `c2`, `faults`, or `own` for scenarios of one's own.
         title: Heading of its part of a page.
         tasks: What each strategy runs.
         strategies: Names.

@@ -67,6 +67,7 @@ _WHOSE = {
     "any": "any robot's map",
     "all": "the last robot's map",
     "shared": "the map of the last robot that still works",
+    "one": "the map of some robot that still works",
 }
 """Ending.termination → by whose map a mission ends."""
 

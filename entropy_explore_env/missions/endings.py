@@ -41,7 +41,7 @@ def mapped_enough(team, clock):
     """Whether those maps that have to have passed the threshold of entropy (Rocha04, eq. 41)."""
     shared, passed, missing = team.params[0], 0, 0
     for index in range(len(team.robots)):
-        if shared.shared_maps and gone(team.faults, index):
+        if (shared.shared_maps or shared.one_map) and gone(team.faults, index):
             continue
         if team.robots[index].entropy_bits <= clock.entropy_end_bits:
             passed += 1
@@ -52,19 +52,24 @@ def mapped_enough(team, clock):
 
 @lean_kernel
 def seen_enough(mission):
-    """Whether the team has seen what ends the mission; where it has to be shared, whether all hold it."""
+    """Whether the team has seen what ends the mission, and, where it is asked, all maps or one hold it."""
     clock, team, joint = mission.clock, mission.team, mission.joint
     if clock.explored_visible < clock.explored_end or clock.explored_free < clock.explored_free_end:
         return False
-    if not team.params[0].shared_maps:
+    shared, precision = team.params[0], mission.maps.beliefs.precision
+    if not (shared.shared_maps or shared.one_map):
         return True
-    working, precision, prior = 0, mission.maps.beliefs.precision, team.params[0].prior_precision
+    working = 0
     for index in range(len(team.robots)):
-        if not gone(team.faults, index):
-            working += 1
-            if not holds_enough(clock, joint.visible, mission.truth, precision[index], prior):
-                return False
-    return working > 0
+        if gone(team.faults, index):
+            continue
+        working += 1
+        if holds_enough(clock, joint.visible, mission.truth, precision[index], shared.prior_precision):
+            if shared.one_map:
+                return True
+        elif shared.shared_maps:
+            return False
+    return working > 0 and shared.shared_maps
 
 
 @lean_kernel

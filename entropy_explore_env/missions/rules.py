@@ -68,6 +68,7 @@ PARAMS = record_type(
         ("period_s", "f8"),  # length of a step; inf = until the next robot has to decide
         ("all_maps", "?"),
         ("shared_maps", "?"),  # those of all robots that still work
+        ("one_map", "?"),  # that of one robot that still works
         ("by_seen", "?"),  # whether the mission ends by what was seen
         ("time_limit_s", "f8"),
         ("max_cycles", "i8"),
@@ -141,6 +142,7 @@ def rules_of(scenario: Scenario) -> Rules:
         "period_s": math.inf if scenario.decision_period_s is None else scenario.decision_period_s,
         "all_maps": ending.termination == "all",
         "shared_maps": ending.termination == "shared",
+        "one_map": ending.termination == "one",
         "by_seen": ending.by_seen,
         "time_limit_s": ending.time_limit_s,
         "max_cycles": _NEVER if ending.max_cycles is None else ending.max_cycles,

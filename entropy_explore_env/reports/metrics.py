@@ -104,13 +104,22 @@ def _ended_by(missions: Missions, mission: int) -> list[str]:
     if end is MissionEnd.MAPPED:
         left_bits = missions.state.robots[mission]["entropy_bits"]
         passed = left_bits <= missions.state.missions[mission]["entropy_end_bits"]
-    elif scenario.ending.termination != "shared":
+    elif scenario.ending.termination in ("any", "all"):
         return ["team"]
     else:
-        passed = np.ones(scenario.robots, np.bool_)
+        passed = _holding(missions, mission)
         if len(faults):
             passed &= ~(faults["stopped"] & np.isinf(faults["stop_until_s"]))
     return [name for name, own in zip(scenario.agents, passed, strict=True) if own]
+
+
+def _holding(missions: Missions, mission: int) -> np.ndarray:
+    """Return (A,) whether each robot's own map holds what ends a mission by what was seen."""
+    state, clock = missions.state, missions.state.missions[mission]
+    held = state.precision[mission] > missions.rules.params["prior_precision"][0]
+    seen = (held & state.visible[mission]).sum(axis=-1)
+    free = (held & state.visible[mission] & (state.truth[mission] <= 0.5)).sum(axis=-1)
+    return (seen >= clock["explored_end"]) & (free >= clock["explored_free_end"])
 
 
 def localization_told(missions: Missions, mission: int) -> dict[str, float | int | None]:

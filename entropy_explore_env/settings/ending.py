@@ -44,8 +44,9 @@ class Ending:
         sigma_end: Standard deviation of coverage at which a voxel counts as known.
         termination: Whose map has to pass the threshold: `any` robot's, that of `all` robots, or with
             `shared` that of every robot that has not stopped for good (`Faults.stop`). With `seen_share` or
-            `unseen_free_voxels`, `any` and `all` mean what the team has seen together, and `shared` what each
-            such robot's own map holds.
+            `unseen_free_voxels`, `any` and `all` mean what the team has seen together, `shared` what each
+            such robot's own map holds, and `one` what the own map of some such robot holds; by entropy `one`
+            is `any` without robots that have stopped for good.
         seen_share: Share of what can be seen at which the mission ends; None = by entropy.
         unseen_free_voxels: Number of unseen free voxels, of those that can be seen, at which the mission
             ends; None = by entropy, or by `seen_share`.
@@ -58,7 +59,7 @@ class Ending:
     """
 
     sigma_end: float = 0.03
-    termination: Literal["any", "all", "shared"] = "any"
+    termination: Literal["any", "all", "shared", "one"] = "any"
     seen_share: float | None = None
     unseen_free_voxels: int | None = None
     return_to_start: bool = False
@@ -78,8 +79,8 @@ class Ending:
                 allowed = "None where seen_share is given"
                 raise SettingError("Ending.unseen_free_voxels", self.unseen_free_voxels, allowed)
         check_kind(self, "return_to_start", bool)
-        if self.return_to_start and (not self.by_seen or self.termination == "shared"):
-            allowed = "False, unless a mission ends by what the team has seen, and termination is not shared"
+        if self.return_to_start and (not self.by_seen or self.termination in ("shared", "one")):
+            allowed = "False, unless a mission ends by what the team has seen, and termination is any or all"
             raise SettingError("Ending.return_to_start", True, allowed)
         check_within(self, "time_limit_s", least=1e-3, most=1e9, inf=True)
         if self.max_cycles is not None:

@@ -43,6 +43,7 @@ _NUMBERS = {
     "elevation-step-m": "height of one count of a 16-bit image",
     "clearance-m": "free space above a height map, or around a mesh",
     "ceiling-m": "height of the exposure surface above the ground of a height map",
+    "gap-m": "point clouds: gaps between points up to this width are solid",
     "scale": "meshes and point clouds: metres of a unit, 0.001 for millimetres",
     "read-limit-s": "limit of the processor time for reading",
     "read-memory-mib": "limit of the memory for reading; default: by the file's size",

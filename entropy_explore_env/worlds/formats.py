@@ -70,6 +70,7 @@ class LoadOptions(TypedDict, total=False):
     fill: bool | None
     inside: bool | None
     scale: float | None
+    gap_m: float | None
     up: str | None
     read_limit_s: float | None
     read_memory_mib: float | None

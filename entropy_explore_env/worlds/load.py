@@ -88,6 +88,8 @@ def load_world(
             solid.
         scale: Meshes and point clouds: metres of a unit, 0.001 for millimetres; None = as the file says, or
             1.
+        gap_m: Point clouds: gaps between points that are at most this wide are solid, so that surfaces hold
+            rays up; None = only voxels with points are.
         up: Meshes and point clouds: the axis that points up, "y" or "z"; None = as the file says, or z.
         read_limit_s: Limit of the processor time for reading; None = 1.5 s, and 20 s for each MiB. On Windows
             reading ends after ten times as much elapsed time and a minute.

@@ -91,7 +91,7 @@ def _visible_to(world: World, scenario: Scenario, kind: RobotKind, starts: _Star
     places = reached & ~np.asarray(ndimage.binary_erosion(reached), np.bool_)
     range_m = min(kind.sensor.max_range_m, float(np.linalg.norm(world.grid.size_m)))
     found = np.zeros(len(left), np.bool_)
-    _look(left, places, free, _steps(range_m / world.grid.voxel_size_m, world.grid.flat), found)
+    _look(left, places, free, _steps(range_m / world.grid.voxel_size_m, world.grid.shape), found)
     if found.all():
         return layout.visible
     seen[tuple(left[~found].T)] = False
@@ -103,11 +103,11 @@ def _visible_to(world: World, scenario: Scenario, kind: RobotKind, starts: _Star
 
 
 @lru_cache(maxsize=8)
-def _steps(range_: float, flat: bool) -> np.ndarray:
-    """(N, 3) int16, all steps of voxels that are at most so long, the shortest first."""
-    reach = math.floor(range_ + 1e-9)
-    along = np.arange(-reach, reach + 1)
-    steps = np.stack(np.meshgrid(along, along, [0] if flat else along, indexing="ij"), axis=-1).reshape(-1, 3)
+def _steps(range_: float, shape: tuple[int, int, int]) -> np.ndarray:
+    """(N, 3) int16, all steps within a grid that are at most so long, in voxels, the shortest first."""
+    farthest = [min(math.floor(range_ + 1e-9), edge - 1) for edge in shape]
+    along = [np.arange(-far, far + 1) for far in farthest]
+    steps = np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, 3)
     squared = (steps.astype(np.int64) ** 2).sum(axis=1)
     order = np.argsort(squared, kind="stable")
     return steps[order[squared[order] <= range_**2 + 1e-9]].astype(np.int16)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.missions.records import MissionEnd
+from entropy_explore_env.reports.metrics import mission_figures
 from tests.reference.scenes import free_box, started, wander
 
 SHARES = {"i_min_bits": 0.0}
@@ -18,6 +19,8 @@ SHARES = {"i_min_bits": 0.0}
         ("all", [True, True], MissionEnd.MAPPED),
         ("shared", [True, False], MissionEnd.RUNNING),
         ("shared", [True, True], MissionEnd.MAPPED),
+        ("one", [False, False], MissionEnd.RUNNING),
+        ("one", [False, True], MissionEnd.MAPPED),
     ],
 )
 def test_a_mission_ends_at_the_first_event_at_which_enough_maps_are_complete(termination, complete, end):
@@ -67,7 +70,8 @@ def test_a_robot_that_stands_still_for_a_while_counts():
 
 
 @pytest.mark.parametrize("goal", [{"seen_share": 0.7}, {"unseen_free_voxels": 60}])
-def test_what_was_seen_has_to_be_in_every_map(goal):
+@pytest.mark.parametrize(("termination", "enough"), [("shared", np.all), ("one", np.any)])
+def test_what_was_seen_has_to_be_in_every_map_or_in_one(goal, termination, enough):
     """The slow reference counts the voxels that each map holds."""
 
     def held(missions):
@@ -78,14 +82,16 @@ def test_what_was_seen_has_to_be_in_every_map(goal):
         return (seen.sum(axis=1) >= clock["explored_end"]) & (free.sum(axis=1) >= clock["explored_free_end"])
 
     together, _ = play(free_box(robots=3, channel={"burst": 2}, ending=goal))
-    assert together.over(0) is MissionEnd.SEEN and not held(together).all()
-    scenario = free_box(robots=3, channel={"burst": 2}, ending={**goal, "termination": "shared"})
+    assert together.over(0) is MissionEnd.SEEN and not held(together).any()
+    scenario = free_box(robots=3, channel={"burst": 2}, ending={**goal, "termination": termination})
     missions, told = started(scenario), []
     rng = np.random.default_rng(0)
     while missions.over(0) is MissionEnd.RUNNING:
-        told.append(bool(held(missions).all()))
+        told.append(bool(enough(held(missions))))
         missions.step(rng.uniform(-1, 1, (1, 3, 5)), np.zeros((1, 3), np.int64))
-    assert missions.over(0) is MissionEnd.SEEN and held(missions).all() and not any(told)
+    assert missions.over(0) is MissionEnd.SEEN and enough(held(missions)) and not any(told)
+    names = [f"robot_{robot}" for robot in np.flatnonzero(held(missions))]
+    assert mission_figures(missions, 0)["ended_by"] == names
     assert missions.state.missions["time_s"][0] > together.state.missions["time_s"][0]
 
 

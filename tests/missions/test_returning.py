@@ -43,7 +43,7 @@ def test_the_mission_ends_when_enough_is_seen_and_the_team_is_home(name, share):
 
 
 def test_only_missions_that_end_by_what_was_seen_may_ask_for_it():
-    for settings in ({}, {"seen_share": 1.0, "termination": "shared"}):
+    for settings in ({}, *({"seen_share": 1.0, "termination": whose} for whose in ("shared", "one"))):
         with pytest.raises(SettingError, match=r"Ending.return_to_start = True: .*seen"):
             Ending(return_to_start=True, **settings)
 

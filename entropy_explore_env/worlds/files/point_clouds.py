@@ -2,8 +2,9 @@
 
 Clouds are in metres and z points up, unless `scale` (metres of a unit) and `up` say otherwise. A PCD's head
 is read as PCL and its forerunners write it, versions .5 to .7: COUNT may lack, and fields with none are
-skipped. A voxel is solid if a point lies in it. A cloud has no information about free space: all other voxels
-in its box count as free. It has no resolution of its own. A PLY with faces is a mesh (`meshes`).
+skipped. A voxel is solid if a point lies in it, and with `gap_m` where points around it leave gaps of at most
+that size. A cloud has no information about free space: all other voxels in its box count as free. It has no
+resolution of its own. A PLY with faces is a mesh (`meshes`).
 """
 
 from __future__ import annotations
@@ -169,7 +170,20 @@ def voxels_of(points_m: np.ndarray, options: Options) -> Voxels:
         some = points_m[first : first + _POINTS_AT_ONCE]
         index = (np.floor(some / voxel_m + 1e-9) - low).astype(np.int64)
         labels[tuple(index.T)] = SOLID
+    gap_m = options.get("gap_m")
+    if gap_m is not None:
+        labels = _closed(labels, max(1, round(0.5 * gap_m / voxel_m)))
     x, y, z = (float(v) for v in low * voxel_m)
     if not all(math.isfinite(v) for v in (x, y, z)):
         raise RefusedError("a point cloud whose corner is finite")
     return Voxels(labels, voxel_m, (x, y, z))
+
+
+def _closed(labels: np.ndarray, voxels: int) -> np.ndarray:
+    """Return the labels (X, Y, Z) with what is solid closed by a cube; `voxels` is half of its edge."""
+    from scipy import ndimage
+
+    cube = np.ones((3, 3, 3), np.bool_)
+    grown = ndimage.binary_dilation(labels == SOLID, cube, voxels)
+    closed = ndimage.binary_erosion(grown, cube, voxels, border_value=1)
+    return np.where(closed, np.int8(SOLID), labels)

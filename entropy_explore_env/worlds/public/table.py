@@ -92,6 +92,8 @@ _C2 = Source(
     "X. Yan, M. Zhang, et al.: C2-Explorer: Contiguity-Driven Task Allocation with Connectivity-Aware Task "
     "Representation for Decentralized Multi-UAV Exploration, IROS 2026, arXiv:2603.07699",
 )
+_C2_OPTIONS = {"gap_m": 0.4}
+"""Their points lie on surfaces with gaps of two or three voxels, through which hollow walls would be seen."""
 _ENTRIES = {
     "warehouse": PublicWorld(
         "floor of a warehouse",
@@ -138,12 +140,14 @@ _ENTRIES = {
         _C2,
         {"octa_maze.pcd": "58c76d34b0338734209bf03e201985005add0b039ba7afa7720abf4b5c64c345"},
         Grid((351, 351, 25), 0.1, (-17.6, -17.3, -0.2)),
+        _C2_OPTIONS,
     ),
     "cubicle_office": PublicWorld(
         "office of cubicles for teams of drones",
         _C2,
         {"cubicle_office.pcd": "4345b9eaabf32a2ac857cdc0b62b836ba882bdc0f7b6770fd6954f8bfc9e061c"},
         Grid((311, 311, 26), 0.1, (-15.200000000000001, -15.700000000000001, -0.2)),
+        _C2_OPTIONS,
     ),
 }
 DUNGEON_CELL_M = 0.1

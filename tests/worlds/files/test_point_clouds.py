@@ -50,6 +50,22 @@ def test_points_that_are_not_finite_are_none(tmp_path):
     assert np.argwhere(world.occupied).tolist() == [[0, 0, 0], [6, 2, 1]]
 
 
+def test_gaps_of_a_surface_are_closed_up_to_their_width(tmp_path):
+    """Walls of points 0.4 m and 1 m apart, 2 m from each other: voxels of 0.2 m between the near points."""
+    near, far = ([f"{x:.1f} {y:.1f} {z:.1f}" for y in axis for z in axis] for x, axis in WALLS)
+    (tmp_path / "cloud.pcd").write_bytes(by_hand(*near, *far))
+    open_, closed = (load_world(tmp_path / "cloud.pcd", 0.2, gap_m=gap_m).occupied for gap_m in (None, 0.4))
+    assert [int(wall.sum()) for wall in (open_[0], open_[-1])] == [36, 9]
+    assert closed[0].all() and int(closed[-1].sum()) == 9
+    assert not closed[1:-1].any()
+    with pytest.raises(SettingError, match=r"gap_m = -1.0: expected a number > 0"):
+        load_world(tmp_path / "cloud.pcd", 0.2, gap_m=-1.0)
+
+
+WALLS = ((0.1, np.arange(6) * 0.4 + 0.1), (2.1, np.arange(3) * 1.0 + 0.1))
+"""x of a wall, and y and z of its points."""
+
+
 def test_a_cloud_needs_a_voxel_size_that_gives_a_box_of_reason(tmp_path):
     path = tmp_path / "cloud.pcd"
     path.write_bytes(by_hand("0 0 0", "900 900 900"))
