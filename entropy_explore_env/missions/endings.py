@@ -16,9 +16,11 @@ from entropy_explore_env.missions.state import MissionState
 _RUNNING, _MAPPED = MissionEnd.RUNNING.code, MissionEnd.MAPPED.code
 _SEEN, _STOPPED = MissionEnd.SEEN.code, MissionEnd.STOPPED.code
 _EXHAUSTED = MissionEnd.EXHAUSTED.code
-IDLE_SCANS, IDLE_ROUNDS = 100, 8.0
+IDLE_SCANS, IDLE_ROUNDS = 100, 3.0
 """A mission that ends by what was seen asks what is left when, a robot on average, this many scans have shown
-nothing new and this many times the workspace's length, width and height together were driven meanwhile."""
+nothing new, or this many times the workspace's length, width and height together were driven meanwhile."""
+_ASKED = 0.875
+"""Share of these that counts as idle already after something was left: it asks again sooner."""
 
 
 @lean_kernel
@@ -76,29 +78,40 @@ def seen_enough(mission):
 def exhausted(mission):
     """Whether the team has long seen nothing new, and no robot has a place left to drive up to.
 
-    It looks at all voxels, but seldom: see IDLE_SCANS. What is left then lies behind gaps that beams pass and
-    bodies do not. A team that has seen enough, and has to share it, goes on.
+    What holds exactly: the team has measured each voxel that can be seen and that lies where a body of the
+    team can come from its start, or beside that; where own maps count, each robot that works has it in its
+    own. And nothing new was seen for IDLE_SCANS scans or IDLE_ROUNDS rounds a robot. What is left
+    then lies behind gaps that beams pass and bodies do not, and the team has had the time to look through
+    them. A team that has seen enough, and has to share it, goes on. All voxels are looked at, but seldom.
     """
     clock, team, drivable = mission.clock, mission.team, mission.joint.drivable
     shared, robots = team.params[0], team.robots
-    if clock.idle_scans < IDLE_SCANS * len(robots):
-        return False
     edges_m = (shared.size[0] + shared.size[1] + shared.size[2]) * shared.voxel_size_m
     now_m = driven_m(robots)
-    if now_m - clock.idle_from_m < IDLE_ROUNDS * edges_m * len(robots):
+    scans, rounds_m = IDLE_SCANS * len(robots), IDLE_ROUNDS * edges_m * len(robots)
+    if clock.idle_scans < scans and now_m - clock.idle_from_m < rounds_m:
         return False
-    clock.idle_scans, clock.idle_from_m = 0, now_m
+    clock.idle_scans = min(clock.idle_scans, int(_ASKED * scans))
+    clock.idle_from_m = max(clock.idle_from_m, now_m - _ASKED * rounds_m)
     if clock.explored_visible >= clock.explored_end and clock.explored_free >= clock.explored_free_end:
         return False
     prior = np.float32(shared.prior_precision)
+    if not (shared.shared_maps or shared.one_map):
+        return not _any_left(drivable, mission.joint.precision, prior)
     for index in range(len(robots)):
-        if gone(team.faults, index):
-            continue
         precision = mission.maps.beliefs.precision[index]
-        for voxel in range(len(drivable)):
-            if drivable[voxel] and precision[voxel] <= prior:
-                return False
+        if not gone(team.faults, index) and _any_left(drivable, precision, prior):
+            return False
     return True
+
+
+@lean_kernel
+def _any_left(drivable, precision, prior):
+    """Return whether some of (V,) drivable voxels was never measured, by (V,) precisions."""
+    for voxel in range(len(drivable)):
+        if drivable[voxel] and precision[voxel] <= prior:
+            return True
+    return False
 
 
 class Returning:
@@ -129,7 +142,7 @@ class Returning:
 
         A robot stands there if its body would touch the one of its start, and its latest drive ended there,
         or did not lead away. Robots that stopped for good are not waited for. A team that has seen enough is
-        not exhausted: it drives home.
+        not exhausted: home is left to reach, until the time is up if a robot cannot get there.
         """
         clocks, robots, params = state.missions, state.robots, rules.params
         enough = (clocks["explored_visible"] >= self.seen) & (clocks["explored_free"] >= self.free)

@@ -40,7 +40,7 @@ class MissionEnd(enum.Enum):
     CYCLES_UP = "The number of steps reached its limit."
     SEEN = "The team has seen as much of the world as the mission asks for."
     STOPPED = "All robots have stopped for good."
-    EXHAUSTED = "Every robot knows all that robots can drive up to, and scans have long shown nothing new."
+    EXHAUSTED = "All that robots can drive up to was seen, and scans have long shown nothing new."
 
     @property
     def code(self) -> int:

@@ -35,8 +35,8 @@ class Ending:
     solid ones beside them, that are in line of sight and range of a place that a body of the team can reach
     from its start: behind a gap too narrow for bodies only what beams through it reach
     (`worlds.sight.visible_from`). Nothing acts on it: the mission keeps the joint map for it
-    (`Scenario.track_truth`). Such a mission is cut off (`MissionEnd.EXHAUSTED`) when every robot's own map
-    holds all of it that robots can drive up to, and the team has long driven without seeing anything new:
+    (`Scenario.track_truth`). Such a mission is cut off (`MissionEnd.EXHAUSTED`) when the team
+    has seen all of it that robots can drive up to, and has long driven without seeing anything new:
     the rest lies behind such gaps (`missions.endings.exhausted`). By entropy a mission needs no such end, as
     measuring again what is in reach lowers the entropy without bound.
 

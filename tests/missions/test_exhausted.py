@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from baselines.experiments.mission import run_mission, scripted_env
+from baselines.strategies import make_strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.endings import IDLE_ROUNDS, IDLE_SCANS
 from entropy_explore_env.missions.records import MissionEnd
@@ -56,35 +58,44 @@ def test_what_can_be_driven_up_to_is_the_own_room_and_its_walls():
     assert drivable[:12].all() and not drivable[13:].any()
 
 
+def leave(missions):
+    """Let a voxel that no scan shows be one that robots can drive up to."""
+    missions.state.drivable[0][-1] = True
+    missions.state.joint_precision[0][-1] = 1e-9
+
+
 @pytest.mark.parametrize(
-    ("known", "scans", "rounds", "end"),
+    ("left", "scans", "rounds", "end"),
     [
-        ([0, 1], IDLE_SCANS, IDLE_ROUNDS, MissionEnd.EXHAUSTED),
-        ([0], IDLE_SCANS, IDLE_ROUNDS, MissionEnd.RUNNING),
-        ([0, 1], IDLE_SCANS - 5, IDLE_ROUNDS, MissionEnd.RUNNING),
-        ([0, 1], IDLE_SCANS, 0.9 * IDLE_ROUNDS, MissionEnd.RUNNING),
+        (False, IDLE_SCANS, 0.9 * IDLE_ROUNDS, MissionEnd.EXHAUSTED),
+        (False, IDLE_SCANS - 5, IDLE_ROUNDS, MissionEnd.EXHAUSTED),
+        (True, IDLE_SCANS, IDLE_ROUNDS, MissionEnd.RUNNING),
+        (False, IDLE_SCANS - 5, 0.9 * IDLE_ROUNDS, MissionEnd.RUNNING),
     ],
 )
-def test_all_robots_know_what_is_near_and_have_long_been_idle(known, scans, rounds, end):
+def test_the_team_has_seen_what_is_near_and_has_long_been_idle(left, scans, rounds, end):
     missions = rooms(channel={"burst": 0})
-    for robot in known:
-        know(missions, robot)
     missions.state.missions[0]["explored_visible"] = 1000  # more than scans can show: they are idle
     missions.state.missions[0]["explored_end"] = 2000
     missions.state.joint_precision[0][:] = 1e4
+    if left:
+        leave(missions)
     idle(missions, scans, rounds)
     assert missions.over(0) is end
     assert not MissionEnd.EXHAUSTED.reached_goal
 
 
-def test_a_robot_that_has_stopped_for_good_need_not_know():
-    missions = rooms(channel={"burst": 0}, faults={"stop": {"at_s": 0.2, "robots": (1,)}})
+@pytest.mark.parametrize(("stops", "end"), [(True, MissionEnd.EXHAUSTED), (False, MissionEnd.RUNNING)])
+def test_where_maps_are_shared_robots_that_work_have_to_know(stops, end):
+    faults = {"faults": {"stop": {"at_s": 0.2, "robots": (1,)}}} if stops else {}
+    ending = {"seen_share": 1.0, "termination": "shared"}
+    missions = rooms(channel={"burst": 0}, ending=ending, **faults)
     missions.state.joint_precision[0][:] = 1e4
-    missions.state.missions[0]["explored_end"] = 2000
+    missions.state.missions[0]["explored_visible"], missions.state.missions[0]["explored_end"] = 1000, 2000
     know(missions, 0)
-    idle(missions)
-    idle(missions)
-    assert missions.over(0) is MissionEnd.EXHAUSTED
+    for _ in range(2):
+        idle(missions)
+    assert missions.over(0) is end
 
 
 def test_a_team_that_has_seen_enough_goes_on_to_share_it():
@@ -96,6 +107,33 @@ def test_a_team_that_has_seen_enough_goes_on_to_share_it():
         know(missions, robot)
     idle(missions)
     assert missions.over(0) is MissionEnd.RUNNING
+
+
+def test_a_team_that_has_something_left_is_asked_again_soon():
+    missions, stay = rooms(channel={"burst": 0}), (np.zeros((1, 2, 5)), np.zeros((1, 2), np.int64))
+    missions.state.joint_precision[0][:] = 1e4
+    clock = missions.state.missions[0]
+    clock["explored_visible"], clock["explored_end"] = 1000, 2000
+    leave(missions)
+    idle(missions)
+    assert missions.over(0) is MissionEnd.RUNNING
+    missions.state.joint_precision[0][-1] = 1e4
+    for _ in range(IDLE_SCANS // 4):
+        missions.step(*stay)
+    assert missions.over(0) is MissionEnd.EXHAUSTED
+
+
+@pytest.mark.parametrize("strategy", ["tour", "voronoi", "distance-advantage", "planned-rate"])
+def test_strategies_end_in_front_of_a_gap_that_beams_pass(strategy):
+    solid = np.zeros((80, 60, 1), bool)
+    solid[40] = True
+    solid[40, 28:31] = False
+    settings = {"robot": {"body_radius_m": 0.25}, "ending": {"seen_share": 0.99, "time_limit_s": 1500.0}}
+    world, starts = World(Grid(solid.shape, 0.1), solid, "gap"), STARTS.copy()
+    starts[:, :2] = [[1.0, 1.0], [1.0, 1.8]]
+    env = scripted_env(SCENARIOS["office"], world=world, robots=2, **settings)
+    run_mission(env, make_strategy(strategy), 0, options={"starts": starts})
+    assert env.missions.over(0) in (MissionEnd.SEEN, MissionEnd.EXHAUSTED)
 
 
 def test_an_environment_cuts_the_mission_off_and_says_why():
