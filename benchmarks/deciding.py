@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 import sys
 import time
 
@@ -13,7 +14,7 @@ from baselines.strategies import make_strategy
 from baselines.strategies.protocol import Stopwatch
 from baselines.suites.public_worlds import fetch_worlds, in_world
 from benchmarks.planning import FLOOR, cluttered
-from benchmarks.rows import Effort, Goal, Row, alone, timed
+from benchmarks.rows import Effort, Goal, Row, alone, compared, timed
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import EntropyExploreError, counted
 from entropy_explore_env.settings.changes import with_settings
@@ -61,7 +62,24 @@ def deciding_rows(effort: Effort) -> list[Row]:
         decision_row(_LARGE_CLIFF, 1, "cliff-next-best-view", few, 50.0),
         decision_row(_LARGE_PLAN, 1, "next-best-view", few, 50.0),
         *(decision_row(plan, 1, "planned-rate", steps, 50.0) for plan in plans),
+        weights_row(effort),
     ]
+
+
+def weights_row(effort: Effort) -> Row:
+    """Return the mean decision by learned weights beside the planner's, in missions of the same starts."""
+    team = {"robots": 3, "max_cycles": effort.steps}
+    env = EntropyExploreEnv(with_settings(scripted(OFFICE), team))
+    means_ms: dict[str, list[float]] = {"pretrained:plans": [], "planned-rate": []}
+    for seed in range(1 + effort.long_rounds):
+        for name, of_rounds in means_ms.items():
+            watch = Stopwatch(make_strategy(name), time.thread_time)
+            run_mission(env, watch, seed)
+            if seed > 0:  # kernels are compiled in the first round
+                of_rounds.append(statistics.fmean(watch.decisions_ms))
+    ours, planner = means_ms.values()
+    job = "a decision of pretrained:plans, office, 3 robots"
+    return compared(job, "planned-rate", ours, planner, "ms", Goal("≤", 1.2))
 
 
 def decision_row(scenario: Scenario, robots: int, strategy: str, steps: int, most_ms: float) -> Row:

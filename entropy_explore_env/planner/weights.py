@@ -31,7 +31,7 @@ BETA = 8.0
 """β: a score that is a tenth smaller halves the odds."""
 MARGIN = 0.1
 """m, so that the planner's choice also leads where others have its score."""
-CANDIDATES = 24
+CANDIDATES = 12
 """Viewpoints that the planner proposes at most."""
 _LEAST_SCORE = 1e-3
 """Smaller scores count as this one."""
