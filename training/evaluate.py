@@ -281,7 +281,7 @@ def table_cells(row: dict[str, Any], seeds: int) -> list[str]:
     if "ratio" not in row:
         return [*cells, "", ""]
     ratio = Interval(row["ratio"], row["ratio_low"], row["ratio_high"])
-    return [*cells, ratio.text(), f"{row['faster']} of {seeds}"]
+    return [*cells, f"{ratio:.2f}", f"{row['faster']} of {seeds}"]
 
 
 if __name__ == "__main__":
