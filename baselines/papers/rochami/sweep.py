@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 from baselines.experiments.experiment import Amount
 from baselines.experiments.mission import mission_record
+from baselines.experiments.rows import Record
 from baselines.experiments.trials import Cell, CellTrial, trials_of
-from baselines.papers.rochami.mission import Run
+from baselines.strategies.rules.mutual_information import MutualInformation
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import LAB, ROOM
 
@@ -30,6 +33,17 @@ _BASE: dict[str, Any] = {
     "robot": {"reach_m": 4.0, "when_blocked": "wait"},
     "ending": {"sigma_end": END_SIGMA, "time_limit_s": TIME_LIMIT_S},
 }
+
+
+@dataclass(frozen=True)
+class Run:
+    """Runs a mission of coordinated robots, whatever the strategy that the cell names, with a κ."""
+
+    distance_cost: float
+
+    def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
+        """Run the mission."""
+        return mission_record(env, MutualInformation(distance_cost=self.distance_cost), seed)
 
 
 def cell_id(robots: int, method: str, blocked: str = "wait") -> str:
