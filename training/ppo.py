@@ -100,8 +100,6 @@ _CHANGEABLE = frozenset(
 _STOPPED = "a checkpoint is written when this rollout and its update, or this validation, are done"
 _RETURNS_MEMORY = 2e5
 """Decisions, about, whose returns normalise: the latest ones, since returns grow as the policy learns."""
-
-
 _UPDATES, _LEAST = 8, (8, 16)
 """Of a short run by default: its updates, and the least missions and steps of a rollout."""
 

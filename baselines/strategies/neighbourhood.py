@@ -33,6 +33,10 @@ from entropy_explore_env.viewpoints.gradient_candidates import gradient_candidat
 
 INTERFERENCE = 0.5
 """η, for each teammate in the candidate's cone."""
+_OVERLAP_SCALE = 0.1
+"""ξ, as a share of what the robot's cone would hold if nothing were known in it."""
+_LEAST_RADIUS_M = 0.5
+"""Lower bound of the radius within which candidates lie, which is r̂ of the latest scan or the reach."""
 MATE = record_type([("begin", "f8", (3,)), ("end", "f8", (3,)), ("touching", "f8")])
 """Where a teammate was heard to be, and to drive to, in grid units; `touching`: sum of the two radii."""
 
@@ -183,12 +187,6 @@ def _place_cone(cone, candidate):
     cone.gaze[2] = -math.sin(candidate.pitch)
     for axis in range(3):
         cone.apex[axis] = candidate.place[axis]
-
-
-_OVERLAP_SCALE = 0.1
-"""ξ, as a share of what the robot's cone would hold if nothing were known in it."""
-_LEAST_RADIUS_M = 0.5
-"""Lower bound of the radius within which candidates lie, which is r̂ of the latest scan or the reach."""
 
 
 class Neighbourhood:

@@ -34,6 +34,9 @@ from entropy_explore_env.viewpoints.evaluation import (
 )
 from entropy_explore_env.viewpoints.expected_scan import expected_bits
 
+_GAZES = 16
+_PITCHES = (-0.6, 0.0, 0.6)
+
 
 def projected_centroid(cell: np.ndarray, density: np.ndarray, threshold: float) -> int:
     """Return the voxel of a cell that is nearest to its centroid (eqs. 6-8); UNREACHED in an empty cell.
@@ -56,10 +59,6 @@ def nearest_uncertain(cell: np.ndarray, costs: np.ndarray, density: np.ndarray, 
     """Return the voxel of a cell with φ ≥ τ that costs least to reach; UNREACHED if no φ is ≥ τ."""
     among = cell[density.reshape(-1)[cell] >= threshold]
     return int(among[int(np.argmin(costs.reshape(-1)[among]))]) if len(among) else UNREACHED
-
-
-_GAZES = 16
-_PITCHES = (-0.6, 0.0, 0.6)
 
 
 class Territory:

@@ -52,6 +52,11 @@ from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
 
+PATCH_M = 5.0
+"""Half the width of the patch whose mean ground is z_av."""
+TOO_HIGH = 0.9
+"""Candidates higher above z_av than this share of the range are dropped."""
+
 
 class TerrainMap(NamedTuple):
     """What is read off one robot's belief of a height field; B blocks of columns, H heights each."""
@@ -212,12 +217,6 @@ def fill_column_costs(terrain, cost, least):
                 voxel = _at_height(terrain, column, height)
                 if voxel != NONE:
                     least[column] = min(least[column], cost[voxel])
-
-
-PATCH_M = 5.0
-"""Half the width of the patch whose mean ground is z_av."""
-TOO_HIGH = 0.9
-"""Candidates higher above z_av than this share of the range are dropped."""
 
 
 class TerrainFrontiers(FrontierMap):

@@ -37,7 +37,7 @@ from entropy_explore_env.randomness import draw_uniform
 from entropy_explore_env.viewpoints.evaluation import voxel_at
 from entropy_explore_env.viewpoints.expected_scan import expected_bits
 
-_SPOT, _NEAR, _FAR = int(Kind.SPOT), int(Kind.NEAR), int(Kind.FAR)
+_NONE, _SPOT, _NEAR, _FAR = int(Kind.NONE), int(Kind.SPOT), int(Kind.NEAR), int(Kind.FAR)
 _LEAVING, _WANDERING = int(PlannerState.LEAVING), int(PlannerState.WANDERING)
 
 
@@ -183,9 +183,6 @@ def choose(proposer, situation, state, size, most_far):
     pool[size].seconds = math.inf
     pool[size].kind = _NEAR if distance_apart(other, here) > 0.0 else _SPOT
     return size + 1, size
-
-
-_NONE, _FAR = int(Kind.NONE), int(Kind.FAR)
 
 
 @lean_kernel

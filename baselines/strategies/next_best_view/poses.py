@@ -27,6 +27,11 @@ from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import robot_model
 from entropy_explore_env.viewpoints.expected_localization import Drive, Surveyor, growth_of_error
 
+_LARGEST_OCCUPANCY = 0.05
+_INTEREST_DECAY = 1.0
+"""β of eq. 9: a voxel that did not answer keeps e^-β of the interest in it."""
+_STEEPEST_RAD = math.pi / 4
+"""Robots that look up and down draw their pitch within this."""
 _NARROWEST_RAD = 0.1
 """Narrower views count as this wide where a robot looks all around."""
 
@@ -116,13 +121,6 @@ def localization_error(view: RobotKnowledge, paths: KnownPaths, pose: np.ndarray
     since_m = view.since_scan_m if scan_every_m == sensor.scan_every_m else 0.0
     drive = Drive(view.pose, path_points(view, paths, pose), pose, float(since_m))
     return float(growth_of_error(view.covariance, surveyor, drive, view.depth_m, np.empty((4, 4))))
-
-
-_LARGEST_OCCUPANCY = 0.05
-_INTEREST_DECAY = 1.0
-"""β of eq. 9: a voxel that did not answer keeps e^-β of the interest in it."""
-_STEEPEST_RAD = math.pi / 4
-"""Robots that look up and down draw their pitch within this."""
 
 
 @dataclass
