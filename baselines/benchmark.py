@@ -251,9 +251,13 @@ def chosen_strategies(words: str | None, suite: Suite | None = None, alone: bool
         names = list(STRATEGIES) if words in (None, "all") else words.split(",")
     for name in names:
         make_strategy(name)
-    compared = suite is None or not (alone or suite.name == "faults")
-    reference = BASELINE if suite is None else REFERENCE
-    return tuple(dict.fromkeys([*([reference] if compared else []), *map(resolved, names)]))
+    if suite is None:
+        added = [BASELINE]
+    elif alone or suite.name == "faults":
+        added = []
+    else:
+        added = [REFERENCE]
+    return tuple(dict.fromkeys([*added, *map(resolved, names)]))
 
 
 if __name__ == "__main__":

@@ -62,7 +62,8 @@ def main(words: Sequence[str]) -> int:
     record = load_record(args.record)
     if args.world_file is not None:
         record = replace(record, scenario=replace(record.scenario, world=args.world_file), world=None)
-    title, log = f"{record.scenario.name}, replayed", MissionLog(args.output, args.out, recorded=False)
+    log = MissionLog(args.output, args.out, recorded=False)
+    title = f"{record.scenario.name}, replayed"
     with log, progress_bar(title, hidden=args.output.json) as show:
         env = _replayed(record, log, show)
         same = same_end(record, env.missions)

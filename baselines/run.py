@@ -78,7 +78,8 @@ def main(words: Sequence[str]) -> int:
     strategy = make_strategy(name)
     check_whole("seed", args.seed, 0)
     env = scripted_env(*tasked(task.scenario, args.task, args.robots), track_truth=True)
-    title, log = f"{args.scenario}, {shown_name(name)}", MissionLog(args.output, args.out, args.record)
+    log = MissionLog(args.output, args.out, args.record)
+    title = f"{args.scenario}, {shown_name(name)}"
     with log, progress_bar(title, hidden=args.output.json) as show:
 
         def after_step(env: EntropyExploreEnv) -> None:

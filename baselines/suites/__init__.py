@@ -55,7 +55,7 @@ def find_suite(name: str, quick: bool = False, strategies: Sequence[str] | None 
         strategies: Names; None = those of its table.
 
     Raises:
-        SettingError: No suite has this name, or its worlds are not where they should be.
+        SettingError: No suite has this name.
     """
     if name not in SUITES:
         raise SettingError("suite", name, one_of(name, SUITES))

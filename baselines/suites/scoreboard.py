@@ -100,11 +100,10 @@ def _dungeon_task(count: int | None) -> Task:
     chosen = [name for name in PUBLIC if name.startswith(_DUNGEON)][:count]
     far = {"robot": {"reach_m": 8.0}, "sensor": {"max_range_m": 8.0}, "track_truth": True}
     base = with_settings(_explored(SCENARIOS["office"], {"unseen_free_voxels": DUNGEON_UNSEEN}), far)
-    there = [dataclasses.replace(in_world(base, name), name="dungeon") for name in chosen]
-    places = (
-        Place(name.removeprefix(_DUNGEON), scenario, 1, _marked_start(name))
-        for name, scenario in zip(chosen, there, strict=True)
-    )
+    places = []
+    for name in chosen:
+        scenario = dataclasses.replace(in_world(base, name), name="dungeon")
+        places.append(Place(name.removeprefix(_DUNGEON), scenario, 1, _marked_start(name)))
     return Task("dungeons", tuple(places))
 
 

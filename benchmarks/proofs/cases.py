@@ -39,10 +39,10 @@ def play_cases(
         limit_s: Elapsed seconds that a case may take.
     """
     for number, outcome in run_each(play, numbers, 1, limit_s, apart=True):
-        yield (
-            number,
-            (outcome.reason[:2000] + place_of(outcome.trace) if isinstance(outcome, Failure) else outcome),
-        )
+        if isinstance(outcome, Failure):
+            yield number, outcome.reason[:2000] + place_of(outcome.trace)
+        else:
+            yield number, outcome
 
 
 def check_step(missions: Missions, rewards: Iterable[Any]) -> None:
