@@ -42,7 +42,8 @@ class ViewProposer:
         self._features = np.zeros((team, most, described * len(FEATURES)), np.float32)
         self._context = np.zeros((team, described * len(CONTEXT)), np.float32)
         self._overlaps = np.zeros((team, most, most if overlaps else 0), np.float32)
-        self._proposed_s = np.full(team, -1.0)
+        self._proposed: list[tuple[float, float] | None] = [None] * team
+        """Time and entropy of the map of the view by which each robot's candidates were proposed."""
 
     def grow(self, scenario: Scenario, shift: np.ndarray) -> None:
         """Go on in a larger grid, in which voxel (0, 0, 0) of the one before has the indices `shift`."""
@@ -56,14 +57,16 @@ class ViewProposer:
         return self._proposers[0].scratch.search
 
     def propose(self, view: RobotView) -> np.ndarray:
-        """Return the viewpoints that are proposed to a robot that decides: at the same time, always the same.
+        """Return the viewpoints that are proposed to a robot that decides.
+
+        They stay the same until the time or the map is another one.
 
         Returns:
             (n, 5) float64, map frame, the planner's own choice first; n ≥ 1.
         """
-        robot = view.robot
-        if self._proposed_s[robot] != view.time_s:
-            self._proposed_s[robot] = view.time_s
+        robot, moment = view.robot, (view.time_s, view.entropy_bits)
+        if self._proposed[robot] != moment:
+            self._proposed[robot] = moment
             self._propose(view)
         candidates = self._candidates[robot]
         return candidates["viewpoint"][candidates["kind"] != Kind.NONE]

@@ -205,6 +205,18 @@ def test_scans_alone_make_a_map_that_grows():
     assert entropy_bits(explorer.map) == pytest.approx(explorer._ground.entropy_bits, rel=1e-6)
 
 
+def test_a_new_map_is_decided_by_even_at_the_same_time():
+    solid = plan_by_hand()
+    seen = np.where(solid, 100, 0).astype(np.int8)
+    task = with_settings(find_scenario("office"), {"robots": 1, "ending": {"seen_share": 0.9}})
+    explorer = Explorer(task, voxel_size_m=EDGE_M)
+    explorer.set_map(seen)
+    assert explorer.goal(START) is None
+    seen[2:20, 30:70] = -1
+    explorer.set_map(seen)
+    assert explorer.goal(START).why is Why.EXPLORES
+
+
 def test_a_map_of_a_belief_is_taken_as_it_is():
     env = EntropyExploreEnv("box-7x11x5", robots=1)
     env.reset(seed=0)
