@@ -26,7 +26,16 @@ from entropy_explore_env.explorer.given_maps import (
     patch_of_map,
     patch_of_occupancies,
 )
-from entropy_explore_env.explorer.goals import Decider, Goal, NoGoal, Why, checked_pose, poses_by_number
+from entropy_explore_env.explorer.goals import (
+    NOTHING_BITS,
+    Decider,
+    Goal,
+    NoGoal,
+    Why,
+    checked_pose,
+    poses_by_number,
+    purpose_of,
+)
 from entropy_explore_env.explorer.ground import Ground, boxes_around
 from entropy_explore_env.explorer.planned_rate import PlannedRate
 from entropy_explore_env.explorer.task import task_of
@@ -43,8 +52,6 @@ from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.settings.validation import is_number, is_whole
 
-_NOTHING_BITS = 1e-6
-"""Expected bits up to which a scan brings nothing."""
 _SAME_PLACE = 1e-3
 """Voxel edges by which a robot may miss its viewpoint and stand in it all the same."""
 
@@ -57,8 +64,8 @@ class Explorer:
         goal = explorer.goal(poses, robot=0)
 
     Maps may grow and move from call to call. Unknown margins are cropped. Where the map outgrows its crop,
-    `planned-rate` goes on in a larger one; another strategy without `grow`, and any one where the map turns
-    or moves by parts of a voxel, begins anew.
+    `planned-rate` goes on in a larger one. A strategy without `grow` begins anew, as any strategy does where
+    the map turns or moves by a fraction of a voxel.
 
     Attributes:
         no_goal: Why the latest call of `goal` returned None; None = it did not.
@@ -292,17 +299,20 @@ class Explorer:
             other.here = mate in placed
             if other.here:
                 self._heard[mate]["heard_s"], self._heard[mate]["pose"] = now_s, placed[mate]
-        viewpoint, outlook = self._chosen(workspace, number, pose, end)
-        self.no_goal = None
-        if viewpoint is None or outlook is None:
+        chosen, self.no_goal = self._chosen(workspace, number, pose, end), None
+        if end is not MoveEnd.UNDER_WAY:
+            seat.count_bits()
+        if chosen is None:
             self.no_goal = NoGoal.OUT_OF_REACH if workspace.beside_unknown() else NoGoal.ALL_SEEN
             seat.target, seat.due_s = pose.copy(), now_s
             return None
+        viewpoint, outlook, homewards = chosen
         seat.target, seat.due_s = viewpoint.copy(), now_s + outlook.seconds
         heard = self._heard[number]
         heard["announced_s"], heard["announced"][:5] = now_s, viewpoint
         heard["announced"][5:] = seat.depth_m, seat.half_angle_rad
-        return self._told(workspace, given[number], viewpoint, outlook, end)
+        why = Why.RETURNS if homewards else purpose_of(outlook.bits, end)
+        return self._told(workspace, given[number], viewpoint, outlook, why)
 
     def _in_canvas(self, workspace: Workspace, robot: int, pose: np.ndarray, name: str) -> np.ndarray:
         """Return a pose in the canvas's frame; that of a robot that stays in a plane lies in it."""
@@ -353,16 +363,14 @@ class Explorer:
 
     def _chosen(
         self, workspace: Workspace, robot: int, pose: np.ndarray, end: MoveEnd
-    ) -> tuple[np.ndarray | None, Outlook | None]:
-        """Return the viewpoint that the strategy chooses and what is expected of it; None = it has none.
+    ) -> tuple[np.ndarray, Outlook, bool] | None:
+        """Return the viewpoint that the strategy chooses, what is expected of it, and whether it leads home.
 
-        A rule begins by a look around. On a map that shows all around already, that is taken as done.
+        None = it has none. A rule begins by a look around; on a map that shows all around already, that is
+        taken as done.
         """
-        seat, together, self._homewards = (
-            self._seats[robot],
-            getattr(self._strategy, "choose_all", None),
-            False,
-        )
+        seat, homewards = self._seats[robot], False
+        together = getattr(self._strategy, "choose_all", None)
         found_nothing = getattr(self._strategy, "found_nothing", None)
         while True:
             moment = self._time_s, end, self._ground.entropy_bits
@@ -370,28 +378,23 @@ class Explorer:
             chosen = self._strategy.choose(view) if together is None else together([view])[0]
             viewpoint = checked_pose("viewpoint chosen", chosen)
             if found_nothing is not None and found_nothing(robot):
-                self._homewards = self._task.ending.return_to_start
-                if not self._homewards or self._apart_m(robot, pose, viewpoint) <= self._arrival_m:
-                    return None, None
+                homewards = self._task.ending.return_to_start
+                if not homewards or self._apart_m(robot, pose, viewpoint) <= self._arrival_m:
+                    return None
             outlook = workspace.outlook(robot, pose, viewpoint)
             stands = self._apart_m(robot, pose, viewpoint) < 0.5 * self._task.grid.voxel_size_m
             begins = robot in self._unbegun
             self._unbegun.discard(robot)
-            if not (begins and stands and outlook.bits <= _NOTHING_BITS):
-                return viewpoint, outlook
+            if not (begins and stands and outlook.bits <= NOTHING_BITS):
+                return viewpoint, outlook, homewards
             seat.target, end = viewpoint.copy(), MoveEnd.ARRIVED
 
     def _told(
-        self, workspace: Workspace, given: np.ndarray, viewpoint: np.ndarray, outlook: Outlook, end: MoveEnd
+        self, workspace: Workspace, given: np.ndarray, viewpoint: np.ndarray, outlook: Outlook, why: Why
     ) -> Goal:
         """Return a goal in the map frame; a robot in a plane keeps the height that it was given."""
         yaw_rad = workspace.canvas.yaw_rad
         there, path = turned_by(viewpoint, yaw_rad), turned_by(outlook.path, yaw_rad)
         if workspace.scenario.in_planes:
             there[2] = path[:, 2] = given[2]
-        why = Why.EXPLORES if outlook.bits > _NOTHING_BITS else Why.PASSES
-        if self._homewards:
-            why = Why.RETURNS
-        if why is Why.PASSES and end is MoveEnd.TEAMMATE:
-            why = Why.GIVES_WAY
         return Goal(there, path, outlook.bits, outlook.seconds, why)

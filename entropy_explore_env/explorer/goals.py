@@ -11,8 +11,12 @@ import numpy as np
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.validation import is_whole
+
+NOTHING_BITS = 1e-6
+"""Expected bits up to which a scan brings nothing."""
 
 
 class Why(enum.Enum):
@@ -22,6 +26,13 @@ class Why(enum.Enum):
     PASSES = "It lies on the way to what is unknown."
     GIVES_WAY = "The robot makes room for a teammate."
     RETURNS = "Nothing is left to see, and the robot drives back to where it started."
+
+
+def purpose_of(expected_bits: float, end: MoveEnd) -> Why:
+    """Return the purpose of a goal, by what is expected of it and how the drive before ended."""
+    if expected_bits > NOTHING_BITS:
+        return Why.EXPLORES
+    return Why.GIVES_WAY if end is MoveEnd.TEAMMATE else Why.PASSES
 
 
 class NoGoal(enum.Enum):
@@ -56,6 +67,7 @@ class Decider(Protocol):
 
     Where the map has outgrown its grid, `grow(scenario, shift)` is called in place of `reset`, if the
     strategy has it: voxel (0, 0, 0) of the grid before has the indices `shift`, (3,) int64, in the new one.
+    A Search in the attribute `search` is used as memory between decisions, too.
     """
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:

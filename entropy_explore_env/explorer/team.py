@@ -25,7 +25,7 @@ class Seat:
     ranges_m: np.ndarray = field(default_factory=lambda: np.zeros(0))
     returned: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int8))
     bits: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    """(R,) that its latest scan brought; (1,) what a map brought that was set since."""
+    """(R,) that its latest scan brought; (1,) what a map brought that was set since; 0 once they counted."""
     depth_m: float = 0.0
     half_angle_rad: float = 0.0
     gained_bits: float = 0.0
@@ -49,6 +49,10 @@ class Seat:
         self.returned = np.where(measured, hits, Return.NOTHING).astype(np.int8)
         self.depth_m, self.half_angle_rad = fused.depth_m, fused.half_angle_rad
         self.gained_bits += fused.total_bits
+
+    def count_bits(self) -> None:
+        """Note that the strategy has decided by these bits, so that the next decision does without them."""
+        self.bits = np.zeros_like(self.bits)
 
     def turn(self, yaw_rad: float) -> None:
         """Turn its poses into another canvas's frame."""

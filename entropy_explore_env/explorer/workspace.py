@@ -52,13 +52,13 @@ class Workspace:
         canvas: The belief.
         scenario: The task, in the canvas's grid.
         rules: The scenario for compiled code.
-        search: Memory of path searches that the strategy lends between its decisions; None = there is none.
+        search: What the strategy has by this name: a Search is used between its decisions, as memory.
     """
 
     def __init__(self, canvas: Canvas, scenario: Scenario) -> None:
         """Take a canvas and a task in its grid."""
         self.canvas, self.scenario, self.rules = canvas, scenario, rules_of(scenario)
-        self.search: Search | None = None
+        self.search: object = None
         self._sensors = [sensor_model(kind.sensor) for kind in scenario.kinds]
 
     @cached_property
@@ -67,7 +67,8 @@ class Workspace:
 
     @cached_property
     def _navigators(self) -> dict[int, Navigator]:
-        return new_navigators(self.scenario, self.search)
+        lent = self.search if isinstance(self.search, Search) else None
+        return new_navigators(self.scenario, lent)
 
     def _kind_number(self, robot: int) -> int:
         return robot % len(self.scenario.kinds)

@@ -205,6 +205,40 @@ def test_scans_alone_make_a_map_that_grows():
     assert entropy_bits(explorer.map) == pytest.approx(explorer._ground.entropy_bits, rel=1e-6)
 
 
+class Listener:
+    """Notes the bits of the latest scan, and goes to and fro."""
+
+    def __init__(self):
+        self.came_bits = []
+
+    def reset(self, scenario, rng):
+        self.step_m = 0.5
+
+    def choose(self, view):
+        self.came_bits.append(view.scan.utility_bits.sum())
+        self.step_m = -self.step_m
+        return view.pose - [self.step_m, 0.0, 0.0, 0.0, 0.0]
+
+    def search(self):
+        """Share a name with what strategies lend."""
+
+
+def test_what_a_map_brought_counts_for_one_decision(seen_from_start):
+    listener = Listener()
+    explorer = Explorer(voxel_size_m=EDGE_M, strategy=listener)
+    part = seen_from_start.copy()
+    part[12:16, 12:16] = -1
+    explorer.set_map(part)
+    for end in (eee.MoveEnd.ARRIVED, eee.MoveEnd.ARRIVED):
+        explorer.goal(START, ended=end)
+    explorer.set_map(seen_from_start)
+    for end in (eee.MoveEnd.UNDER_WAY, eee.MoveEnd.OBSTACLE, eee.MoveEnd.ARRIVED):
+        explorer.goal(START, ended=end)
+    first, again, under_way, blocked, after = listener.came_bits
+    assert first > under_way == blocked > 0.0
+    assert again == after == 0.0
+
+
 def test_a_new_map_is_decided_by_even_at_the_same_time():
     solid = plan_by_hand()
     seen = np.where(solid, 100, 0).astype(np.int8)
