@@ -205,14 +205,15 @@ class VoxelFrontiers(FrontierMap):
 
         This one is larger, and still empty. Dropped cells count again where the map has changed around them.
         """
-
-        def numbers(voxels: np.ndarray) -> np.ndarray:
-            return np.asarray(np.ravel_multi_index(tuple((other._axes_of(voxels) + shift).T), self._size))
-
         out = np.flatnonzero(other._marks & (EXCLUDED | DROPPED))
-        self._marks[numbers(out)] = other._marks[out] & (EXCLUDED | DROPPED)
+        self._marks[self.renumbered(other, out, shift)] = other._marks[out] & (EXCLUDED | DROPPED)
         for voxel, (was, edges) in other._dropped.items():
-            self._dropped[int(numbers(np.array([voxel]))[0])] = was, numbers(edges)
+            moved = int(self.renumbered(other, np.array(voxel), shift))
+            self._dropped[moved] = was, self.renumbered(other, edges, shift)
+
+    def renumbered(self, other: VoxelFrontiers, voxels: np.ndarray, shift: np.ndarray) -> np.ndarray:
+        """Return the numbers here of another map's voxels (...); `shift` is that of `remember`."""
+        return np.asarray(np.ravel_multi_index(tuple((other._axes_of(voxels) + shift).T), self._size))
 
     def readmit(self) -> None:
         """See `FrontierMap`; dropped cells count again, too."""

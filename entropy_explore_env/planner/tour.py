@@ -127,22 +127,18 @@ class SharedTour(Tour):
 
     def grow(self, scenario: Scenario, shift: np.ndarray) -> None:
         """Go on in a larger grid, in which voxel (0, 0, 0) of the one before has the indices `shift`."""
-        before, after, self._scenario = self._scenario.grid.shape, scenario.grid.shape, scenario
-        self.search = new_search(scenario.grid.voxels)
-
-        def number(voxel: int) -> int:
-            if voxel < 0:  # NONE and the like
-                return voxel
-            at = np.array(np.unravel_index(voxel, before)) + shift
-            return int(np.ravel_multi_index(tuple(at), after))
-
+        self._scenario, self.search = scenario, new_search(scenario.grid.voxels)
         for robot, memory in self._memories.items():
-            kind = scenario.kind_of(robot)
+            kind, before = scenario.kind_of(robot), memory.cells
             cells = VoxelFrontiers(scenario, kind)
-            cells.remember(memory.cells, shift)
+            cells.remember(before, shift)
             memory.cells, memory.paths = cells, KnownPaths(scenario, kind, cells, self.search)
-            target, place, looked, gaze = memory.goal
-            memory.goal = Goal(number(target), number(place), looked, gaze)
+            # What is below 0 is no voxel: NONE and the like.
+            target, place = (
+                voxel if voxel < 0 else int(cells.renumbered(before, np.array(voxel), shift))
+                for voxel in memory.goal[:2]
+            )
+            memory.goal = memory.goal._replace(target=target, place=place)
 
     def pick(self, scene: Scene) -> Goal:
         """Return the voxel to go to; see `FrontierRule`."""
