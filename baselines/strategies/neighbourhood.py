@@ -203,8 +203,8 @@ class Neighbourhood:
             scenario: Of the mission.
             rng: Decides between equal voxels.
         """
-        self._coordinated, self._distance_cost = coordinated, float(distance_cost)
-        self._rng, grid = rng, scenario.grid
+        self._coordinated, self._distance_cost, self._rng = coordinated, distance_cost, rng
+        grid = scenario.grid
         self._footprints = [
             new_lattice(
                 grid.shape, kind.robot.planning_radius_m / grid.voxel_size_m, scenario.layer_of(kind.robot)

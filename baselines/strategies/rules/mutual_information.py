@@ -56,13 +56,13 @@ class MutualInformation(Driver):
             raise SettingError("coordinated", coordinated, "True or False")
         if not 0.0 <= distance_cost < math.inf:
             raise SettingError("distance_cost", distance_cost, "a number ≥ 0")
-        self._settings = coordinated, distance_cost
+        self._coordinated, self._distance_cost = coordinated, float(distance_cost)
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
         super().reset(scenario, rng)
         self._chosen = [deque[np.ndarray](maxlen=_MEMORY) for _ in range(scenario.robots)]
-        self._neighbourhood = Neighbourhood(*self._settings, scenario, rng)
+        self._neighbourhood = Neighbourhood(self._coordinated, self._distance_cost, scenario, rng)
 
     def give_way(self, view: RobotKnowledge, trail: Trail) -> None:
         """Leave it to the rule: by RochaMI a robot wanders, or waits in place (`Robot.when_blocked`)."""
