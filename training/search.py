@@ -201,7 +201,7 @@ class Results:
 class Lead(NamedTuple):
     """A mission that is led by weights."""
 
-    name: str  # Of the result that it belongs to
+    name: str  # of the result that it belongs to
     part: int  # 1 for w + δ, 0 for w - δ; where spreads are measured, the number of the task
     scenario: Scenario
     weights: PlannerWeights
@@ -252,7 +252,7 @@ class Pairs(NamedTuple):
     directions: np.ndarray  # (N, S) e
     slopes: np.ndarray  # (N,) y
     ln_times: np.ndarray  # (N,) mean of both logarithms of seconds
-    finished: float = 1.0  # Share of the missions that were finished
+    finished: float = 1.0  # share of the missions that were finished
 
 
 def shrunk_slope(history: Sequence[Sequence[Pairs]]) -> tuple[np.ndarray, float]:

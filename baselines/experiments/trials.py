@@ -289,7 +289,7 @@ def described_scenario(cell: Cell) -> dict[str, Any]:
 
 @lru_cache(maxsize=1)
 def _former_files() -> dict[str, list[str]]:
-    """Return name and digest of the files that some public worlds once were: all their rows hold them."""
+    """Return, by public world, name and digest of its former file, which rows hold in place of its name."""
     with Path(__file__).with_name("row_worlds.csv").open(newline="") as table:
         return {row["world"]: [row["file"], row["digest"]] for row in csv.DictReader(table)}
 

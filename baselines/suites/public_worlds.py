@@ -19,7 +19,7 @@ def in_world(scenario: Scenario, name: str, settings: Mapping[str, Any] | None =
 
 
 def fetch_worlds(scenarios: Iterable[Scenario]) -> None:
-    """Have the files of all public worlds of some scenarios on this machine.
+    """Fetch the files of the public worlds of some scenarios, unless this machine has them.
 
     Raises:
         WorldError: A world cannot be fetched.

@@ -1,4 +1,4 @@
-"""What is known of each cell of one robot's map, and its blocks: where mapped space ends, one candidate each.
+"""States of the cells of one robot's map, where its mapped space ends, and one candidate for each block.
 
 A cell is a voxel, or a column of ground. A voxel is explored once its σ has fallen to a stated level. The
 edge (Yamauchi 1998) consists of mapped free cells next to unexplored ones; at a finer level also of mapped

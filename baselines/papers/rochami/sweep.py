@@ -37,7 +37,7 @@ _BASE: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Run:
-    """Runs a mission of coordinated robots, whatever the strategy that the cell names, with a κ."""
+    """Runs a mission of `mutual-information` with another κ than the strategy of that name has."""
 
     distance_cost: float
 
