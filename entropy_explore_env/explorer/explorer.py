@@ -134,12 +134,11 @@ class Explorer:
         else:
             grow(workspace.scenario, shift)
         workspace.search = getattr(self._strategy, "search", None)
+        turn_rad = self._yaw_rad - workspace.canvas.yaw_rad
         for seat in self._seats:
-            seat.turn(self._yaw_rad - workspace.canvas.yaw_rad)
+            seat.turn(turn_rad)
         for name in ("pose", "announced"):
-            self._heard[name][:, :5] = turned_by(
-                self._heard[name][:, :5], self._yaw_rad - workspace.canvas.yaw_rad
-            )
+            self._heard[name][:, :5] = turned_by(self._heard[name][:, :5], turn_rad)
         self._yaw_rad = workspace.canvas.yaw_rad
 
     @property

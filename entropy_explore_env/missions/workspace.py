@@ -44,7 +44,7 @@ class Workspace(NamedTuple):
     covariances: np.ndarray | None
     """(2, 4, 4) float64; None = no robot chooses landmarks in its own map: nothing of that is compiled."""
     log: ScanLog
-    """Every scan, if somebody asked for them: `Missions.log_scans`."""
+    """All scans, where `Missions.log_scans` was called; else no room for any."""
 
 
 def new_workspace(scenario: Scenario, navigators: Mapping[int, Navigator]) -> Workspace:
@@ -66,7 +66,7 @@ def new_workspace(scenario: Scenario, navigators: Mapping[int, Navigator]) -> Wo
         if navigators
         else np.zeros((len(kinds), 0, 3), np.int64),
         covariances=np.zeros((2, 4, 4)) if scenario.drifts and scenario.fiducials.own_number else None,
-        log=new_scan_log(0, max(sensor.rays for sensor in sensors)),
+        log=new_scan_log(0, 0),
     )
 
 

@@ -36,12 +36,12 @@ class Source:
 
 @dataclass(frozen=True)
 class PublicWorld:
-    """A world of others.
+    """A world that others have published.
 
     Attributes:
         about: What it is, in a few words.
         source: Where its files come from.
-        files: File name → SHA-256; the first is the one that is read.
+        files: File name → SHA-256; the first file is the one that is read, and may name the others.
         grid: The grid of the world as it is read by default.
         options: Options of `load_world` with which it is read, unless others are given; `voxel_size_m` is
             that of the grid.
@@ -93,7 +93,7 @@ _C2 = Source(
     "Representation for Decentralized Multi-UAV Exploration, IROS 2026, arXiv:2603.07699",
 )
 _C2_OPTIONS = {"gap_m": 0.4}
-"""Their points lie on surfaces with gaps of two or three voxels, through which hollow walls would be seen."""
+"""Their points lie on surfaces with gaps of two or three voxels, through which beams would enter walls."""
 _ENTRIES = {
     "warehouse": PublicWorld(
         "floor of a warehouse",
@@ -150,16 +150,16 @@ _ENTRIES = {
         _C2_OPTIONS,
     ),
 }
-DUNGEON_CELL_M = 0.1
-"""What a pixel of the dungeons, whose images state no size, is taken to be."""
+_DUNGEON_CELL_M = 0.1
+"""Size that a pixel of the dungeons is taken to have: their images state none."""
 _BELOW_FLOOR = 140.0
 """In the dungeons' images rock has the shade 127, the start mark 157 and other floor 195."""
 
 
 def _dungeons() -> Iterator[tuple[str, PublicWorld]]:
     """Yield the dungeons of ARiADNE's test set `complex`."""
-    grid = Grid((640, 480, 1), DUNGEON_CELL_M)
-    options = {"resolution_m": DUNGEON_CELL_M, "occupied_below": _BELOW_FLOOR}
+    grid = Grid((640, 480, 1), _DUNGEON_CELL_M)
+    options = {"resolution_m": _DUNGEON_CELL_M, "occupied_below": _BELOW_FLOOR}
     make = partial(PublicWorld, "generated dungeon of a test set", _ARIADNE, grid=grid, options=options)
     with Path(__file__).with_name("dungeons.csv").open(newline="") as file:
         for row in csv.DictReader(file):
