@@ -25,8 +25,6 @@ _FINER = 0.99
 """What is known is known a little better than the task asks for, so that rounding does not matter."""
 _SAME_SIZE = 1e-3
 """Share by which the size of voxels of a map may differ from what was asked for: float32 in messages."""
-
-
 _AT_ONCE = 1 << 18
 """Voxels of a map that are turned into a belief at once, so that large maps take little memory."""
 
@@ -41,7 +39,7 @@ class Occupancies(NamedTuple):
     unknown_between: tuple[float, float]
 
     def rows(self, first: int, last: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return of the X from the first up to but without the last one (X, Y, Z) mean and known.
+        """Return mean and known of the rows along x from `first` up to but without `last`, each (X, Y, Z).
 
         The mean is the expected coverage in float32, ½ where it is unknown.
         """
@@ -149,7 +147,7 @@ class Patch(NamedTuple):
         return self.given.mean.shape if isinstance(self.given, Map) else self.given.grid.shape
 
     def parts(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """Yield (x, mean, precision) of rows that together are the map; x is that of the first of them.
+        """Yield the map in blocks of rows along x: index of the first row, mean and precision.
 
         Arrays are (X, Y, Z) float32.
         """
@@ -165,7 +163,7 @@ class Patch(NamedTuple):
 
 
 def _rows(shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
-    """Yield the first x and the one past the last of rows of an (X, Y, Z) map that are taken at once."""
+    """Yield the blocks of rows along x in which an (X, Y, Z) map is read: their first row and the end."""
     at_once = max(1, _AT_ONCE // (shape[1] * shape[2]))
     for first in range(0, shape[0], at_once):
         yield first, min(first + at_once, shape[0])
@@ -180,8 +178,8 @@ def box_of(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     return np.array(low, np.int64), np.array(high, np.int64)
 
 
-def _box_of(given: Occupancies) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the box of what is known of a grid: see `Patch`."""
+def _known_box(given: Occupancies) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return the box of what is known of a grid, block by block: see `Patch`."""
     low, high = np.array(given.grid.shape), np.zeros(3, np.int64)
     for first, last in _rows(given.grid.shape):
         box = box_of(given.rows(first, last)[1])
@@ -214,4 +212,4 @@ def patch_of_occupancies(
     """Return an occupancy grid as a patch of a task's belief: what it says is as certain as the task asks."""
     sigma = _FINER * min(_KNOWN_SIGMA, task.ending.sigma_end)
     precisions = np.float32(task.sigma_prior**-2), np.float32(sigma**-2)
-    return Patch(given, _box_of(given), corner, bottom_m, precisions)
+    return Patch(given, _known_box(given), corner, bottom_m, precisions)

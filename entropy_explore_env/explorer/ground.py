@@ -27,7 +27,8 @@ class Ground:
 
     Attributes:
         begun: How many canvases there were: with each one, numbers of voxels change.
-        shift: (3,) int64, where in the canvas the first voxel of the one before lies; None = it has others.
+        shift: (3,) int64, where the first voxel of the canvas before lies in this one; None = it lies between
+            voxels, or there was none.
         entropy_bits: Entropy of the belief.
     """
 

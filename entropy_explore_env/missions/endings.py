@@ -20,7 +20,7 @@ IDLE_SCANS, IDLE_ROUNDS = 100, 3.0
 """A mission that ends by what was seen asks what is left when, a robot on average, this many scans have shown
 nothing new, or this many times the workspace's length, width and height together were driven meanwhile."""
 _ASKED = 0.875
-"""Share of these that counts as idle already after something was left: it asks again sooner."""
+"""Share of these limits at which counts go on where something was left, so that it is asked again soon."""
 
 
 @lean_kernel
@@ -78,11 +78,11 @@ def seen_enough(mission):
 def exhausted(mission):
     """Whether the team has long seen nothing new, and no robot has a place left to drive up to.
 
-    What holds exactly: the team has measured each voxel that can be seen and that lies where a body of the
-    team can come from its start, or beside that; where own maps count, each robot that works has it in its
-    own. And nothing new was seen for IDLE_SCANS scans or IDLE_ROUNDS rounds a robot. What is left
-    then lies behind gaps that beams pass and bodies do not, and the team has had the time to look through
-    them. A team that has seen enough, and has to share it, goes on. All voxels are looked at, but seldom.
+    The team must have measured every voxel that can be seen and lies where a body of the team can get to from
+    its start, or beside such a place; where own maps count, every robot that still works must have it in its
+    own. Besides, nothing new was seen for IDLE_SCANS scans or IDLE_ROUNDS rounds a robot. What is left then
+    lies behind gaps that beams pass and bodies do not, and the team has had the time to look through them. A
+    team that has seen enough, and has to share it, goes on. All voxels are looked at, but seldom.
     """
     clock, team, drivable = mission.clock, mission.team, mission.joint.drivable
     shared, robots = team.params[0], team.robots

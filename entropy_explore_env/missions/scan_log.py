@@ -1,4 +1,4 @@
-"""Every scan of a step, for those who write missions down: the state keeps the latest one of each robot."""
+"""All scans of a step, for writers of bags: the state keeps only the latest scan of each robot."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 
 
 class ScanLog(NamedTuple):
-    """Room for N scans of up to R rays; of more than N scans the latest are kept, each in number modulo N."""
+    """Room for N scans of up to R rays; of more scans the latest N are kept, scan n in row n modulo N."""
 
     count: np.ndarray
-    """(1,) int64, scans that were noted; set to 0 by the reader."""
+    """(1,) int64, scans noted since the reader last set it to 0."""
     time_s: np.ndarray
     """(N,) float64."""
     robot: np.ndarray

@@ -35,18 +35,18 @@ class Ending:
     solid ones beside them, that are in line of sight and range of a place that a body of the team can reach
     from its start: behind a gap too narrow for bodies only what beams through it reach
     (`worlds.sight.visible_from`). Nothing acts on it: the mission keeps the joint map for it
-    (`Scenario.track_truth`). Such a mission is cut off (`MissionEnd.EXHAUSTED`) when the team
-    has seen all of it that robots can drive up to, and has long driven without seeing anything new:
-    the rest lies behind such gaps (`missions.endings.exhausted`). By entropy a mission needs no such end, as
-    measuring again what is in reach lowers the entropy without bound.
+    (`Scenario.track_truth`). Such a mission is cut off (`MissionEnd.EXHAUSTED`) when the team has seen all
+    that robots can drive up to, and has long driven without seeing anything new: the rest lies behind such
+    gaps (`missions.endings.exhausted`). A mission that ends by entropy needs no such end, as measuring again
+    what is in reach lowers the entropy without bound.
 
     Attributes:
         sigma_end: Standard deviation of coverage at which a voxel counts as known.
         termination: Whose map has to pass the threshold: `any` robot's, that of `all` robots, or with
             `shared` that of every robot that has not stopped for good (`Faults.stop`). With `seen_share` or
             `unseen_free_voxels`, `any` and `all` mean what the team has seen together, `shared` what each
-            such robot's own map holds, and `one` what the own map of some such robot holds; by entropy `one`
-            is `any` without robots that have stopped for good.
+            such robot's own map holds, and `one` what the own map of at least one of them holds. By entropy,
+            `one` is `any` among the robots that have not stopped for good.
         seen_share: Share of what can be seen at which the mission ends; None = by entropy.
         unseen_free_voxels: Number of unseen free voxels, of those that can be seen, at which the mission
             ends; None = by entropy, or by `seen_share`.

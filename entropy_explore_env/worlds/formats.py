@@ -41,7 +41,7 @@ FORMATS = {
 }
 """Suffix in lower case → how the file is read."""
 NAMES = (JACKSBORO, *PUBLIC)
-"""What stands for a world as a file does: names have no suffix, files have one."""
+"""Names that stand for a world wherever a file may: names have no suffix, files have one."""
 _TO_CONVERT = {
     ".npy": "a = numpy.load(path); World(Grid(a.shape, 0.05), a > 0, 'name'), with a of three axes",
     **dict.fromkeys((".fbx", ".blend", ".3ds", ".ifc", ".step", ".stp"), "export it as .glb or .obj"),

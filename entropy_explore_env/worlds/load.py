@@ -66,10 +66,10 @@ def load_world(
 
     Args:
         path: The file, `jacksboro`, or the name of a public world.
-        voxel_size_m: Edge of the voxels wanted; None = the file's own, which clouds and meshes do not have;
-            of a public world that of its table.
-            Where voxels are resampled, one is free if at least half of it is known to be free and less than
-            a quarter of it is occupied, so that thin walls stay.
+        voxel_size_m: Edge of the voxels wanted; None = that of the table for a public world, and for others
+            the file's own, which clouds and meshes do not have. Where voxels are resampled, one is free if at
+            least half of it is known to be free and less than a quarter of it is occupied, so that thin walls
+            stay.
         height_m: Plans are extruded to this height; None = they stay 2-D.
         resolution_m: Edge of an image's pixel (None = 0.05); spacing of a height map that does not state it.
         negate: Images: bright pixels are solid.
@@ -88,8 +88,8 @@ def load_world(
             solid.
         scale: Meshes and point clouds: metres of a unit, 0.001 for millimetres; None = as the file says, or
             1.
-        gap_m: Point clouds: gaps between points that are at most this wide are solid, so that surfaces hold
-            rays up; None = only voxels with points are.
+        gap_m: Point clouds: gaps between points that are at most this wide are solid, so that surfaces stop
+            rays; None = only voxels with points are solid.
         up: Meshes and point clouds: the axis that points up, "y" or "z"; None = as the file says, or z.
         read_limit_s: Limit of the processor time for reading; None = 1.5 s, and 20 s for each MiB. On Windows
             reading ends after ten times as much elapsed time and a minute.

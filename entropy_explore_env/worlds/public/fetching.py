@@ -54,7 +54,10 @@ def public_file(name: str) -> Path:
 
 
 def found_file(world: PublicWorld, folder: Path) -> Path | None:
-    """Return where a folder has a world's files beside each other, with the right content; None = nowhere."""
+    """Return the first file of a world where a folder, or one in it, has all of them; None = none has.
+
+    Only files with the right content count.
+    """
     first, *_ = world.files
     own = folder / world.source.name / first
     if _is_whole(world, own):
@@ -84,7 +87,7 @@ def _digest_of(file: Path, changed_ns: int, size: int) -> str:
 
 
 def _fetched(name: str, world: PublicWorld, folder: Path) -> Path:
-    """Fetch the files of a world; each appears in its folder only when its content is right."""
+    """Fetch the files of a world into a folder, in which a file appears only with the right content."""
     try:
         import pooch
     except ImportError:
