@@ -67,9 +67,8 @@ def main(words: Sequence[str]) -> int:
         _list(args.folder)
         return 0
     target: Path | None = args.out
-    suffix = ".png" if args.command == "show" else ".npz"
-    if target is not None and (target.suffix.lower() != suffix or target.is_dir()):
-        raise SettingError("out", str(target), f"a file whose name ends in {suffix}")
+    if target is not None:
+        _check_target(target, ".png" if args.command == "show" else ".npz")
     world = _world(args)
     about = _about(world)
     if args.command == "show":
@@ -85,6 +84,14 @@ def main(words: Sequence[str]) -> int:
         source = PUBLIC[args.source].source
         print(f"licence: {source.licence}\ncite: {source.citation}")
     return 0
+
+
+def _check_target(target: Path, suffix: str) -> None:
+    """Raise a SettingError unless a file with a suffix can have this path."""
+    if target.suffix.lower() != suffix or target.is_dir():
+        raise SettingError("out", str(target), f"a file whose name ends in {suffix}")
+    if any(folder.is_file() for folder in target.parents):
+        raise SettingError("out", str(target), "a file in a folder")
 
 
 def _parser() -> argparse.ArgumentParser:
