@@ -49,24 +49,31 @@ def new_blocks(shape: tuple[int, int, int], edge: int) -> Blocks:
     return Blocks(edge, np.zeros(count), np.zeros(count), np.full(count, NOT_REACHED, np.int64))
 
 
-@lean_kernel
-def _is_opening(belief, known_precision, x, y, z):
+@inlined_kernel
+def _is_free(belief, known_precision, voxel):
+    """Return whether a voxel is known to be free."""
+    return belief.precision[voxel] >= known_precision and belief.mean[voxel] <= STOP_AT_COVERED
+
+
+@inlined_kernel
+def _is_opening(belief, known_precision, voxel, x, y, z):
     """Return whether one of the six voxels beside an unknown one is known to be free."""
-    size = belief.size
-    for axis in range(3):
-        for step in (-1, 1):
-            i, j, k = x + step * (axis == 0), y + step * (axis == 1), z + step * (axis == 2)
-            if 0 <= i < size[0] and 0 <= j < size[1] and 0 <= k < size[2]:
-                beside = flat_index(size, i, j, k)
-                if belief.precision[beside] >= known_precision and belief.mean[beside] <= STOP_AT_COVERED:
-                    return True
-    return False
+    size, row, column = belief.size, belief.size[2], belief.size[1] * belief.size[2]
+    return (
+        (z > 0 and _is_free(belief, known_precision, voxel - 1))
+        or (z < size[2] - 1 and _is_free(belief, known_precision, voxel + 1))
+        or (y > 0 and _is_free(belief, known_precision, voxel - row))
+        or (y < size[1] - 1 and _is_free(belief, known_precision, voxel + row))
+        or (x > 0 and _is_free(belief, known_precision, voxel - column))
+        or (x < size[0] - 1 and _is_free(belief, known_precision, voxel + column))
+    )
 
 
 @inlined_kernel
 def _fill_block(search, belief, count, layer, low, high):
     """Return (bits, promised, place) of the block of the voxels from `low` up to, not including, `high`."""
     bits, promised, place, nearest = 0.0, 0.0, NOT_REACHED, math.inf
+    latest, left = np.float32(0.0), 0.0  # most voxels have the prior's precision: its logarithm is taken once
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
             for z in range(low[2], high[2]):
@@ -75,11 +82,13 @@ def _fill_block(search, belief, count, layer, low, high):
                     continue
                 known = belief.precision[voxel] >= count.known_precision
                 if belief.precision[voxel] < count.target_precision:
-                    left = remaining_bits(belief.precision[voxel], count.target_precision)
+                    if belief.precision[voxel] != latest:
+                        latest = belief.precision[voxel]
+                        left = remaining_bits(latest, count.target_precision)
                     bits += left
                     if known:
                         promised += left
-                    elif _is_opening(belief, count.known_precision, x, y, z):
+                    elif _is_opening(belief, count.known_precision, voxel, x, y, z):
                         promised += count.behind * left
                 if not known or (layer >= 0 and z != layer) or math.isinf(cost_to(search, voxel)):
                     continue
