@@ -192,7 +192,7 @@ _OWN = (
     Entry(
         "pretrained:plans",
         partial(PlannedRate, shipped_weights("plans")),
-        "`planned-rate` that chooses among 24 candidates by learned weights of 19 features",
+        "`planned-rate` that chooses among 12 candidates by learned weights of 19 features",
         _NAMED_SUITES,
     ),
     Entry(

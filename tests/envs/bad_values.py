@@ -84,8 +84,9 @@ PARTS = ("grid", "robot", "sensor", "channel", "ending", "reward", "action", "ob
 
 def fields(kind: type) -> dict[str, Is]:
     """The fields of settings, and which of the wrong values are right in them."""
-    found = {}
-    for name, hint in typing.get_type_hints(kind).items():
+    found, hints = {}, typing.get_type_hints(kind)
+    for name in (field.name for field in dataclasses.fields(kind)):
+        hint = hints[name]
         allowed = Is.NONE if type(None) in typing.get_args(hint) else Is(0)
         if hint is bool:
             allowed |= Is.BOOL
