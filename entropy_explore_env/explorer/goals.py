@@ -1,4 +1,4 @@
-"""Answers of an Explorer, a goal or the reason why there is none, and checks of poses that it is given."""
+"""Answers of an Explorer, a goal or the reason for having none, and checks of the poses that it is given."""
 
 from __future__ import annotations
 

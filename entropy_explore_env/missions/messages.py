@@ -51,8 +51,9 @@ from entropy_explore_env.settings.channel import BITS_PER_MEASUREMENT, BITS_PER_
 
 _OUT_OF_RANGE, _LOST = Delivery.OUT_OF_RANGE.code, Delivery.LOST.code
 _ANNOUNCEMENT = np.int64(-1)
-ONE_MESSAGE = np.int64(1)
 """In place of a number of measurements. A NumPy integer, so that callees compile for one type."""
+ONE_MESSAGE = np.int64(1)
+"""Number of messages of a broadcast that is sent at once; a NumPy integer for the same reason."""
 
 
 class Team(NamedTuple):

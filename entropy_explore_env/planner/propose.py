@@ -1,6 +1,7 @@
 """A robot's candidates, from what it knows: drawn, refined, chosen, selected, and described.
 
-The planner's own choice is the best viewpoint nearby or far away, or a way out where there is none.
+The planner's own choice is the best viewpoint nearby or far away. Where no viewpoint is worth a scan, it is a
+random way out.
 """
 
 from __future__ import annotations

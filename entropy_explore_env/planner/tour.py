@@ -7,7 +7,7 @@ tour of shortest paths through all of these (`open_tours`). TARE solves the two 
 Ours: the place chosen last stays the first unless that makes the tour longer by more than a share.
 
 `SharedTour` plans through the frontier cells that are nearer to the robot, by its paths, than to where
-teammates go, by the straight line; where there is none, through all of them. To a dead end, a frontier of few
+teammates go, by the straight line; if no cell is, through all of them. To a dead end, a frontier of few
 connected voxels behind which little lies, the robot need not drive: it looks into it from the place that
 makes the path over it to the tour's next place shortest, if that is shorter than over the cell, and goes on
 to the cell where the look leaves it a frontier.

@@ -40,5 +40,5 @@ def unknown_world():
     costs = belief_costs(mean, precision, PRIOR)
     experience = np.zeros(1, EXPERIENCE)[0]
     belief = Belief(mean.reshape(-1), precision.reshape(-1), SIZE)
-    nobody = np.zeros(0, CONE), np.zeros(0, MATE)
-    return precision, Situation(knowledge(ALONG_X, 0.0), belief, costs, *nobody, experience)
+    no_teammates = np.zeros(0, CONE), np.zeros(0, MATE)
+    return precision, Situation(knowledge(ALONG_X, 0.0), belief, costs, *no_teammates, experience)

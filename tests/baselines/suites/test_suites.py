@@ -127,7 +127,7 @@ def test_unknown_suites_and_missing_worlds_are_named(monkeypatch, tmp_path):
     with pytest.raises(SettingError, match=r"suite = .plan.: expected one of plans, volumes, teams"):
         find_suite("plan", False, TEAMS)
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "worlds"))
-    monkeypatch.setattr(fetching, "HOST", "http://127.0.0.1:9")  # where nobody listens
+    monkeypatch.setattr(fetching, "HOST", "http://127.0.0.1:9")  # a port that no server listens on
     with pytest.raises(WorldError, match=r"world = 'dungeon-1': expected img_1.png, which could not be"):
         run_suite(find_suite("plans", True, TEAMS), tmp_path / "rows.jsonl", How())
     assert not (tmp_path / "rows.jsonl").exists()
