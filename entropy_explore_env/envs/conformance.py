@@ -164,7 +164,7 @@ def row_of(result: tuple[Any, ...], mission: int) -> dict[str, Any]:
             **{name: np.ravel(infos[name][mission]).tolist() for name in _ROBOT_INFOS},
         },
         "reward_robots": np.ravel(infos["reward_robots"][mission]).tolist(),
-        "end": list(MissionEnd)[infos["end"][mission]].name,
+        "end": list(MissionEnd)[infos["end"][mission]],
     }
 
 

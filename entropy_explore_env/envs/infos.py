@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -14,14 +13,13 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.robots.motion import MoveEnd
 
-_MOVE_ENDS = [end.name for end in MoveEnd]
-_UNDER_WAY = MoveEnd.UNDER_WAY.name
-_MISSION_ENDS = [end.name for end in MissionEnd]
-
+_MOVE_ENDS, _MISSION_ENDS = list(MoveEnd), list(MissionEnd)
 
 END_FIGURES = ("t_mission_s", "bits_gained_per_bit_sent")
-"""Figures that infos at a mission's end hold by themselves, as numbers that loggers of episodes can show:
+"""Figures that infos hold by themselves, as numbers that loggers of episodes can show:
 Stable-Baselines3's Monitor and VecMonitor by `info_keywords=END_FIGURES`."""
+_NOT_YET: dict[str, float] = dict.fromkeys(END_FIGURES, 0.0)
+"""Not NaN, which checkers of environments hold for chance."""
 
 
 def end_figures(figures: Mapping[str, Any]) -> dict[str, float]:
@@ -29,30 +27,26 @@ def end_figures(figures: Mapping[str, Any]) -> dict[str, float]:
     return {name: math.nan if figures[name] is None else float(figures[name]) for name in END_FIGURES}
 
 
-def robot_infos(missions: Missions, mission: int, texts: bool = True) -> list[dict[str, Any]]:
-    """Return an info for each robot of a mission.
+def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
+    """Return an info for each robot of a mission: numbers with the same names at all times.
 
     Keys: `deciding` (whether its next action counts), `time_s`, `world_number` (the world's, which `reset`
     takes as its option `world`; -1 where no recipe made it), `entropy_bits`, `own_bits` and
-    `received_bits` (taken from its map in this step), `move_end` and `end` (names of a MoveEnd and
-    a MissionEnd), and `action_mask` where actions are numbers; when the mission is over, `figures`:
-    those of `mission_figures`, and beside them the two of END_FIGURES. Where the mission ends by what the
-    team has seen also `seen_share`, of all that can be seen. Where the scenario has faults
-    also `stopped`, `blind` and `silent`: whether the robot fails so now. Where robots drift also
-    `pose_error_m` and `pose_error_rad`: how far off the robot's estimate of its pose was
-    when it last scanned or decided under way; nothing acts on it.
+    `received_bits` (taken from its map in this step), `move_end` and `end` (a MoveEnd and a
+    MissionEnd, which print as their names), the two of END_FIGURES (0 until the mission is over), and
+    `action_mask` where actions are numbers. Where the mission ends by what the team has seen also
+    `seen_share`, of all that can be seen. Where the scenario has faults also `stopped`, `blind` and `silent`:
+    whether the robot fails so now. Where robots drift also `pose_error_m` and `pose_error_rad`: how far off
+    the robot's estimate of its pose was when it last scanned or decided under way; nothing acts on it.
 
     Args:
         missions: The missions.
         mission: Which.
-        texts: False, for tools that turn all infos into tensors: `move_end` and `end` are the codes of their
-            members, and there is no `figures`.
     """
     clock = missions.state.missions[mission]
     robots = missions.state.robots[mission]
-    time_s, end = float(clock["time_s"]), _MISSION_ENDS[clock["end"]] if texts else int(clock["end"])
-    move_ends = _MOVE_ENDS if texts else range(len(_MOVE_ENDS))
-    driving = _UNDER_WAY if texts else MoveEnd.UNDER_WAY.code
+    time_s, end = float(clock["time_s"]), _MISSION_ENDS[clock["end"]]
+    at_end = end_figures(mission_figures(missions, mission)) if end else _NOT_YET
     world_number = int(missions.world_numbers[mission])
     infos: list[dict[str, Any]] = [
         {
@@ -62,8 +56,9 @@ def robot_infos(missions: Missions, mission: int, texts: bool = True) -> list[di
             "entropy_bits": entropy_bits,
             "own_bits": own_bits,
             "received_bits": received_bits,
-            "move_end": driving if under_way else move_ends[move_end],
+            "move_end": MoveEnd.UNDER_WAY if under_way else _MOVE_ENDS[move_end],
             "end": end,
+            **at_end,
         }
         for deciding, under_way, entropy_bits, own_bits, received_bits, move_end in zip(
             robots["deciding"].tolist(),
@@ -90,9 +85,4 @@ def robot_infos(missions: Missions, mission: int, texts: bool = True) -> list[di
     if missions.scenario.action.by_number:
         for info, mask in zip(infos, missions.action_masks()[mission], strict=True):
             info["action_mask"] = mask
-    if clock["end"] and texts:
-        figures = mission_figures(missions, mission)
-        for info in infos:
-            info["figures"] = copy.deepcopy(figures)
-            info |= end_figures(figures)
     return infos

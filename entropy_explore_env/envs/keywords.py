@@ -54,4 +54,3 @@ class EnvironmentSettings(ScenarioSettings, total=False):
 
     reward_function: RewardFunction | None
     every_reset: Mapping[str, Any] | None
-    text_infos: bool

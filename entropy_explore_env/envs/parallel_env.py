@@ -25,10 +25,10 @@ from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.reset_options import mission_options, named_options
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import RobotView, view_of
+from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.painting import FRAMES_PER_S, Painter, check_render_mode, offered_modes
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import find_scenario
-from entropy_explore_env.settings.validation import check_instance
 from entropy_explore_env.worlds.given import with_given_worlds
 
 if TYPE_CHECKING:
@@ -67,7 +67,6 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         *,
         reward_function: RewardFunction | None = None,
         every_reset: Mapping[str, Any] | None = None,
-        text_infos: bool = True,
         **settings: Unpack[ScenarioSettings],
     ) -> None:
         """Make the environment; `reset` starts a mission.
@@ -77,8 +76,6 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
             render_mode: None, "human" or "rgb_array".
             reward_function: Rewards the robots in place of the scenario's reward; see `envs.rewards`.
             every_reset: `starts` and `world` of all missions, for resets that do not say them.
-            text_infos: Whether infos hold texts (names of ends, and `figures` at a mission's end); False for
-                tools that turn all infos into tensors: see `envs.infos.robot_infos`.
             **settings: Fields of the Scenario to change; `world` may also be a World, a sequence of
                 them, or a mapping of a file's `path` and options: see `worlds.given`.
 
@@ -87,8 +84,6 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
             WorldError: The world cannot be used.
         """
         check_render_mode(render_mode)
-        check_instance("text_infos", text_infos, bool)
-        self._text_infos = text_infos
         asked, given = with_given_worlds(find_scenario(scenario, settings.get("robots")), settings)
         self._rewards = StepRewards(reward_function)
         self.missions = Missions(asked, given=given)
@@ -233,7 +228,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         return dict(zip(self.agents, rows, strict=True))
 
     def _infos(self) -> dict[str, dict[str, Any]]:
-        return dict(zip(self.agents, robot_infos(self.missions, 0, self._text_infos), strict=True))
+        return dict(zip(self.agents, robot_infos(self.missions, 0), strict=True))
 
     def __repr__(self) -> str:
         """Its scenario, its team and its voxels."""
@@ -247,6 +242,15 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         """
         self.missions.check_begun("joint_map")
         return joint_map(self.missions)
+
+    def figures(self) -> dict[str, Any]:
+        """Return the mission's figures up to now, those that `reports.metrics.mission_figures` describes.
+
+        Raises:
+            CallOrderError: There was no reset yet.
+        """
+        self.missions.check_begun("figures")
+        return mission_figures(self.missions, 0)
 
     def set_world_block(
         self, low_m: Sequence[float], high_m: Sequence[float], solid: bool = True, at_s: float | None = None
@@ -274,8 +278,8 @@ def parallel_env(
     Args:
         scenario: A scenario's name (`entropy_explore_env.SCENARIOS`), or a Scenario.
         render_mode: None, `rgb_array` or `human`.
-        **settings: `reward_function`, `every_reset` and `text_infos`, see `EntropyExploreEnv`; and fields of
-            the Scenario to change: `robots`, `world` (a recipe, a file, a World, or
+        **settings: `reward_function` and `every_reset`, see `EntropyExploreEnv`; and fields of the
+            Scenario to change: `robots`, `world` (a recipe, a file, a World, or
             several Worlds dealt to missions in turn: see `worlds.given`),
             `decision_period_s`, `max_cycles`, `time_limit_s`, and its parts `grid`, `robot`, `sensor`,
             `channel` (`{"burst": 32, "i_min_bits": 0.3}`), `ending`, `reward`, `action`, `observation`,

@@ -6,6 +6,7 @@ Not imported with the package: it needs ray, from the extra `rllib`.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +36,7 @@ class EntropyExploreMultiAgentEnv(MultiAgentEnv):
     A step ends when the next robot has to decide. Only robots that decide observe, act and get a reward:
     what they earned since they last decided, the costs of the seconds between included. So nothing that
     a busy robot was asked for is ever learned from. At the mission's end every robot gets its last
-    observation and what is left of its rewards.
+    observation, what is left of its rewards, and in its infos the mission's `figures`.
 
     The episode is over when all robots are done, however each of them is.
     """
@@ -124,6 +125,9 @@ class EntropyExploreMultiAgentEnv(MultiAgentEnv):
             if heard:
                 break
             actions = ignored
+        if not self.team.agents:
+            figures = self.team.figures()
+            infos = {agent: {**infos[agent], "figures": copy.deepcopy(figures)} for agent in infos}
         earned = {agent: self._earned[agent] for agent in heard}
         self._earned.update(dict.fromkeys(heard, 0.0))
         return (

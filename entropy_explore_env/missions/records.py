@@ -6,11 +6,11 @@ simulation does not carry from step to step is not here.
 
 from __future__ import annotations
 
-import enum
 import math
 
 import numpy as np
 
+from entropy_explore_env.codes import Coded
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.robots.ranges import (
     COUNT,
@@ -31,7 +31,7 @@ from entropy_explore_env.robots.ranges import (
 from entropy_explore_env.settings.grid import MAX_VOXELS
 
 
-class MissionEnd(enum.Enum):
+class MissionEnd(Coded):
     """Why a mission is over; the value is a sentence for people."""
 
     RUNNING = "The mission goes on."
@@ -41,11 +41,6 @@ class MissionEnd(enum.Enum):
     SEEN = "The team has seen as much of the world as the mission asks for."
     STOPPED = "All robots have stopped for good."
     EXHAUSTED = "All that robots can drive up to was seen, and scans have long shown nothing new."
-
-    @property
-    def code(self) -> int:
-        """Number of this end in arrays."""
-        return list(MissionEnd).index(self)
 
     @property
     def reached_goal(self) -> bool:

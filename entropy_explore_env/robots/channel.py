@@ -14,7 +14,6 @@ matter of distance, of free sight through the true world, or of a signal that wa
 
 from __future__ import annotations
 
-import enum
 import math
 from typing import NamedTuple
 
@@ -30,6 +29,7 @@ from entropy_explore_env.belief.raycast import (
     Line,
     cast_ray,
 )
+from entropy_explore_env.codes import Coded
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.randomness import draw_uniform
 
@@ -42,17 +42,12 @@ _LEAST_I_MIN_BITS = 1e-6
 """So low that it forbids nothing, and so high that it is back within some dozen scans."""
 
 
-class Delivery(enum.Enum):
+class Delivery(Coded):
     """What became of a message on its way to one teammate; the value is a sentence for people."""
 
     HEARD = "The message arrives, at once or after the channel's delay."
     OUT_OF_RANGE = "The teammate was out of reach when it was sent: too far away, or behind walls."
     LOST = "The message was lost by chance."
-
-    @property
-    def code(self) -> int:
-        """Number of this delivery in arrays."""
-        return list(Delivery).index(self)
 
 
 _HEARD, _OUT_OF_RANGE, _LOST = (delivery.code for delivery in Delivery)

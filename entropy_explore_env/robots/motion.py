@@ -8,7 +8,6 @@ can always come to rest in the tube that it owns. So bodies never overlap, whate
 
 from __future__ import annotations
 
-import enum
 import math
 from typing import NamedTuple
 
@@ -24,10 +23,11 @@ from entropy_explore_env.belief.raycast import (
     cast_ray,
 )
 from entropy_explore_env.belief.voxel_index import flat_index
+from entropy_explore_env.codes import Coded
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 
-class MoveEnd(enum.Enum):
+class MoveEnd(Coded):
     """Why a drive ended where it did; the value is a sentence for people."""
 
     ARRIVED = "The robot reached its viewpoint."
@@ -42,11 +42,6 @@ class MoveEnd(enum.Enum):
     UNDER_WAY = "The drive goes on: the robot decides again without stopping."
     FAILED = "A fault stopped the robot where it was."
     EDGE = "The ground ends there: the robot stands in the last voxel in which all of it is carried."
-
-    @property
-    def code(self) -> int:
-        """Number of this end in arrays."""
-        return list(MoveEnd).index(self)
 
     @property
     def blocked(self) -> bool:

@@ -1,12 +1,21 @@
 """Infos say what is true, and the action mask marks the moves that make sense."""
 
 import math
+import pickle
 from typing import Any
 
 import numpy as np
 import pytest
 
-from entropy_explore_env import EntropyExploreEnv, MissionEnd, MoveEnd, RobotView, SettingError, parallel_env
+from entropy_explore_env import (
+    CallOrderError,
+    EntropyExploreEnv,
+    MissionEnd,
+    MoveEnd,
+    RobotView,
+    parallel_env,
+)
+from entropy_explore_env.envs.infos import END_FIGURES
 from entropy_explore_env.reports.metrics import mission_figures
 from tests.envs.pairwise import pairwise
 from tests.reference.scenes import SMALL
@@ -84,7 +93,7 @@ def test_infos_agree_with_views_and_are_plain_python() -> None:
         "own_bits": float,
         "received_bits": float,
     }
-    kinds |= {"move_end": str, "end": str}
+    kinds |= {"move_end": MoveEnd, "end": MissionEnd, **dict.fromkeys(END_FIGURES, float)}
     _, infos = env.reset(seed=0)
     deciding = set()
     while env.agents:
@@ -92,7 +101,7 @@ def test_infos_agree_with_views_and_are_plain_python() -> None:
             view = env.view(agent)
             assert {name: type(value) for name, value in info.items()} == kinds
             assert (info["deciding"], info["time_s"]) == (view.deciding, view.time_s)
-            assert (info["entropy_bits"], info["move_end"]) == (view.entropy_bits, view.move_end.name)
+            assert (info["entropy_bits"], info["move_end"]) == (view.entropy_bits, view.move_end)
             assert info["own_bits"] >= 0.0 and info["received_bits"] >= 0.0
             deciding.add(info["deciding"])
         actions = {agent: rng.uniform(-1, 1, 5).astype(np.float32) for agent in env.agents}
@@ -102,15 +111,16 @@ def test_infos_agree_with_views_and_are_plain_python() -> None:
     assert deciding == {True, False}
 
 
-def test_at_the_end_of_a_scored_mission_infos_say_all_figures() -> None:
+def test_an_environment_says_all_figures_of_a_scored_mission() -> None:
     env = parallel_env(BOX, robots=2, max_cycles=30, track_truth=True)
     rng = np.random.default_rng(0)
-    _, infos = env.reset(seed=0)
+    with pytest.raises(CallOrderError, match="figures"):
+        env.figures()
+    env.reset(seed=0)
     while env.agents:
-        assert all("figures" not in info for info in infos.values())
-        infos = env.step({agent: rng.uniform(-1, 1, 5).astype(np.float32) for agent in env.agents})[4]
-    first, second = (infos[agent]["figures"] for agent in env.possible_agents)
-    assert first == second == mission_figures(env.missions, 0, floor=True)
+        env.step({agent: rng.uniform(-1, 1, 5).astype(np.float32) for agent in env.agents})
+    first = env.figures()
+    assert first == mission_figures(env.missions, 0, floor=True)
     marks = {
         figure for share in (50, 90, 95, 99, 100) for figure in (f"t{share}_seen_s", f"path{share}_seen_m")
     }
@@ -119,20 +129,21 @@ def test_at_the_end_of_a_scored_mission_infos_say_all_figures() -> None:
     assert mission_figures(env.missions, 0, floor=False)["scans_over_floor"] is None
 
 
-def test_infos_without_texts_are_numbers_and_masks():
-    env = EntropyExploreEnv(BOX, text_infos=False, action=DISCRETE, ending={"max_cycles": 3})
-    texts = EntropyExploreEnv(BOX, action=DISCRETE, ending={"max_cycles": 3})
-    (_, infos), (_, named) = env.reset(seed=0), texts.reset(seed=0)
+def test_infos_are_numbers_with_the_same_names_from_reset_to_end():
+    env = EntropyExploreEnv(BOX, action=DISCRETE, ending={"max_cycles": 3})
+    _, infos = env.reset(seed=0)
+    names = list(infos["robot_0"])
     while env.agents:
-        for agent, info in infos.items():
+        assert infos["robot_0"]["t_mission_s"] == 0.0
+        infos = env.step(dict.fromkeys(env.agents, 0))[4]
+        for info in infos.values():
+            assert list(info) == names
             assert all(isinstance(value, bool | int | float | np.ndarray) for value in info.values())
-            assert list(MoveEnd)[info["move_end"]].name == named[agent]["move_end"]
-        actions = {agent: 0 for agent in env.agents}
-        infos, named = env.step(actions)[4], texts.step(actions)[4]
-    assert list(MissionEnd)[infos["robot_0"]["end"]] is MissionEnd.CYCLES_UP
-    assert "figures" in named["robot_0"] and "figures" not in infos["robot_0"]
-    with pytest.raises(SettingError, match="text_infos"):
-        EntropyExploreEnv(BOX, text_infos="no")
+    end = infos["robot_0"]["end"]
+    assert end is MissionEnd.CYCLES_UP and end == end.code == 3
+    assert (str(end), f"{end}", repr(end)) == ("CYCLES_UP", "CYCLES_UP", "MissionEnd.CYCLES_UP")
+    assert pickle.loads(pickle.dumps(end)) is end and MissionEnd(end.value) is end
+    assert infos["robot_0"]["t_mission_s"] == infos["robot_0"]["time_s"]
 
 
 @pytest.mark.parametrize(
@@ -151,8 +162,8 @@ def test_figures_say_whose_maps_ended_the_mission(ending, named):
     for agent in env.agents:
         env.action_space(agent).seed(0)
     while env.agents:
-        _, _, _, _, infos = env.step({agent: env.action_space(agent).sample() for agent in env.agents})
-    ended_by = infos["robot_0"]["figures"]["ended_by"]
+        env.step({agent: env.action_space(agent).sample() for agent in env.agents})
+    ended_by = env.figures()["ended_by"]
     assert set(ended_by) == named or (
         ending.get("termination") is None and "sigma_end" in ending and ended_by
     )

@@ -16,6 +16,7 @@ from pettingzoo import AECEnv
 from entropy_explore_env import (
     SCENARIOS,
     EntropyExploreEnv,
+    MissionEnd,
     SettingError,
     environment_id,
     find_scenario,
@@ -73,11 +74,11 @@ def test_the_mission_ends_for_all_robots_together_when_a_map_is_known() -> None:
     results = played(team)
     for _, _, terminations, truncations, infos in results[:-1]:
         assert not any([*terminations.values(), *truncations.values()])
-        assert {info["end"] for info in infos.values()} == {"RUNNING"}
+        assert {info["end"] for info in infos.values()} == {MissionEnd.RUNNING}
     _, _, terminations, truncations, infos = results[-1]
     assert list(terminations.values()) == [True] * 3
     assert list(truncations.values()) == [False] * 3
-    assert {info["end"] for info in infos.values()} == {"MAPPED"}
+    assert {info["end"] for info in infos.values()} == {MissionEnd.MAPPED}
     threshold = BOX_VOXELS * math.log2(math.sqrt(2 * math.pi * math.e) * 10.0)
     assert min(info["entropy_bits"] for info in infos.values()) <= threshold
     assert min(info["entropy_bits"] for info in results[-2][4].values()) > threshold

@@ -146,6 +146,8 @@ def test_an_environment_cuts_the_mission_off_and_says_why():
         _, _, terminated, truncated, infos = env.step({"robot_0": to})
         if not env.agents:
             break
-    assert infos["robot_0"]["end"] == "EXHAUSTED" and truncated["robot_0"] and not terminated["robot_0"]
+    assert (
+        infos["robot_0"]["end"] is MissionEnd.EXHAUSTED and truncated["robot_0"] and not terminated["robot_0"]
+    )
     seen, asked = env.missions.state.missions[0][["explored_visible", "explored_end"]]
     assert 0.5 * asked < seen < asked

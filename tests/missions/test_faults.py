@@ -85,7 +85,7 @@ def test_a_mission_in_which_all_have_stopped_for_good_is_cut_off(period_s):
         _, _, terminations, truncations, infos = env.step(actions)
     assert all(truncations.values()) and not any(terminations.values())
     assert [info["stopped"] for info in infos.values()] == [True, True]
-    assert infos["robot_0"]["figures"]["faults"]["robots_stopped"] == 2
+    assert env.figures()["faults"]["robots_stopped"] == 2
 
 
 def test_all_may_stand_still_for_a_while_without_an_end():

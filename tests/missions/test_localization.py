@@ -273,7 +273,7 @@ def test_infos_and_figures_say_how_wrong_robots_are():
     while env.agents:
         actions = {agent: rng.uniform(-1, 1, 5).astype(np.float32) for agent in env.agents}
         _, _, _, _, infos = env.step(actions)
-    figures = infos["robot_0"]["figures"]["localization"]
+    figures = env.figures()["localization"]
     estimates, robots = env.missions.state.estimates[0], env.missions.state.robots[0]
     assert figures["rms_error_m"] == math.sqrt(estimates["squared_m2"].sum() / robots["scans"].sum())
     assert figures["rms_error_rad"] == math.sqrt(estimates["squared_rad2"].sum() / robots["scans"].sum())
