@@ -79,7 +79,11 @@ def columns(
     if clearance_m is None:
         clearance_m = SKY_VOXELS * voxel_m if ceiling_m is None else ceiling_m + voxel_m
     plan = [n * step / voxel_m for n, step in zip(elevation_m.shape, spacing_m, strict=True)]
-    shape = checked_shape([*plan, (high - floor_m) / voxel_m + max(1.0, math.ceil(clearance_m / voxel_m))])
+    layers_above = max(1.0, math.ceil(clearance_m / voxel_m))
+    try:
+        shape = checked_shape([*plan, (high - floor_m) / voxel_m + layers_above])
+    except RefusedError as error:
+        raise RefusedError(f"{error}; its heights are from {low:.6g} to {high:.6g} m") from None
     top_m = _highest(
         _highest(elevation_m, shape[0], voxel_m / spacing_m[0]).T, shape[1], voxel_m / spacing_m[1]
     ).T

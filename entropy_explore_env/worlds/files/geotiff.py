@@ -100,7 +100,9 @@ def _heights_m(raw: np.ndarray, tags: Mapping[int, Any], keys: Mapping[str, Any]
     stated = str(tags.get(_GDAL_NODATA, "")).strip("\0 \t\r\n")
     if stated:
         with np.errstate(over="ignore", invalid="ignore"):
-            rows[raw == np.float64(stated).astype(raw.dtype)] = np.nan
+            nodata = np.float64(stated).astype(raw.dtype)
+        if raw.dtype.kind == "f" or nodata == float(stated):  # whole numbers have no NaN
+            rows[raw == nodata] = np.nan
     about = _gdal_items(tags.get(_GDAL_METADATA))
     named = about.get("unittype", "").strip().lower()
     if not named or "VerticalUnitsGeoKey" in keys:

@@ -133,11 +133,14 @@ def _about(path: Path) -> dict[str, Any]:
     if len(data) > MAX_YAML_BYTES:
         raise RefusedError(f"a YAML of at most {MAX_YAML_BYTES} bytes")
     depth = 0
-    for event in yaml.parse(data, Loader=yaml.BaseLoader):
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) or depth > _MAX_DEPTH:
-            raise RefusedError("a YAML without aliases and tags, and of little depth")
-    about = yaml.load(data, Loader=yaml.BaseLoader)
+    try:
+        for event in yaml.parse(data, Loader=yaml.BaseLoader):
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            if isinstance(event, yaml.AliasEvent) or getattr(event, "tag", None) or depth > _MAX_DEPTH:
+                raise RefusedError("a YAML without aliases and tags, and of little depth")
+        about = yaml.load(data, Loader=yaml.BaseLoader)
+    except yaml.YAMLError as error:
+        raise RefusedError(f"a file in YAML, but {' '.join(str(error).split())[:200]}") from None
     if not isinstance(about, dict):
         raise RefusedError("a YAML of map_server")
     for name in ("image", "resolution", "origin", "occupied_thresh", "free_thresh"):

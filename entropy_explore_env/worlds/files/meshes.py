@@ -30,8 +30,9 @@ from entropy_explore_env.worlds.files.voxels import (
 )
 
 NEEDS = (("trimesh", "trimesh"), ("scipy.ndimage", "scipy"))
-_INWARDS = 1e-6
-"""Surfaces are moved inwards by this many voxels: one between two voxels belongs to the solid's side."""
+_INWARDS = 1e-3
+"""Triangles are moved inwards by this many voxels, and their corners towards their middles: a surface between
+two voxels, where files in float32 leave it a little to one side, belongs to the solid."""
 _SHARE = 2.0
 """Triangles are cut into four until no edge is longer than a voxel divided by this; the surface's voxels are
 those that a corner of these small triangles lies in."""
@@ -96,12 +97,9 @@ def _voxels(mesh: Any, options: Options, up: str = "z", unit_m: float = 1.0) -> 
         raise RefusedError("a mesh whose vertices are finite")
     margin = math.ceil(clearance_m / voxel_m - 1e-9)
     check_extent(np.ptp(vertices, axis=0) + (2.0 + 2.0 * margin) * voxel_m, voxel_m, options)
-    faces = np.asarray(mesh.faces)[mesh.unique_faces()]
-    normals = upright(np.asarray(mesh.vertex_normals), Options({"up": options.get("up")}), up)
-    if inside:  # the solid's side is the outer one, whichever way the triangles are wound
-        normals = -normals if mesh.volume >= 0 else normals
-    vertices = vertices - _INWARDS * voxel_m * normals
-    solid, low = _surface(vertices - 0.5 * voxel_m, faces, voxel_m)
+    corners = vertices[np.asarray(mesh.faces)[mesh.unique_faces()]] / voxel_m - 0.5
+    outer = inside and mesh.volume >= 0  # the solid's side, whichever way the triangles are wound
+    solid, low = _surface(_moved_inwards(corners, -1.0 if outer else 1.0))
     if inside:
         enclosed = np.asarray(ndimage.binary_fill_holes(solid), np.bool_) & ~solid
         if not enclosed.any():
@@ -119,22 +117,31 @@ def _voxels(mesh: Any, options: Options, up: str = "z", unit_m: float = 1.0) -> 
     return Voxels(labels, voxel_m, (x, y, z))
 
 
-def _surface(vertices: np.ndarray, faces: np.ndarray, voxel_m: float) -> tuple[np.ndarray, np.ndarray]:
+def _moved_inwards(corners: np.ndarray, sign: float) -> np.ndarray:
+    """Return triangles (M, 3, 3), voxels, a little smaller and moved against their normals, times a sign."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    normals = sign * _unit(np.cross(b - a, c - a))[:, None]
+    return corners - _INWARDS * (normals + _unit(corners - corners.mean(axis=1, keepdims=True)))
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    """(…, 3) vectors of length 1, or 0 where a vector is 0."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300)
+
+
+def _surface(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the voxels that the corners of a surface, divided into small triangles, lie in.
 
     Args:
-        vertices: (N, 3) metres, moved so that voxels have their centres on multiples of their size.
-        faces: (M, 3) their indices, a triangle each.
-        voxel_m: Edge of a voxel.
+        corners: (M, 3, 3) triangles in voxels, which have their centres on whole numbers.
 
     Returns:
         (X, Y, Z) bool, the voxels of the surface's box, and (3,) float64, its lowest voxel.
     """
-    places = vertices / voxel_m
+    places = corners.reshape(-1, 3)
     low, high = np.round(places.min(axis=0)), np.round(places.max(axis=0))
     solid = np.zeros((high - low + 1.0).astype(np.int64), np.bool_)
     _mark(solid, low, places)
-    corners = places[faces]
     thin = _are_thin(corners)
     for ends, of_parts in (
         (_divided(corners[~thin]), _corners_of_parts),

@@ -146,7 +146,7 @@ def check_extent(extent_m: np.ndarray, voxel_m: float, options: Options) -> tupl
     except RefusedError as error:
         if options.get("scale") is not None or not _KILOMETRE <= extent_m.max() < math.inf:
             raise
-        box = " × ".join(f"{edge:,.4g}" for edge in extent_m)
+        box = " × ".join(f"{edge:,.0f}" for edge in extent_m)
         asked = "is it in millimetres? scale=0.001 (--scale 0.001) says so"
         raise RefusedError(f"{error}; the box is {box} m: {asked}") from None
 

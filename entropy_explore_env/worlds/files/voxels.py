@@ -80,7 +80,8 @@ class Options:
         """
         value = self.get(name)
         if value is None:
-            raise SettingError(name, None, f"a number > 0: {kind} does not state it")
+            flag = name.replace("_", "-")
+            raise SettingError(name, None, f"a number > 0 (--{flag}): {kind} does not state it")
         return float(value)
 
     def refuse_unused(self, kind: str) -> None:

@@ -155,9 +155,22 @@ def test_nodata_is_compared_in_the_rasters_type(tmp_path, text, value):
     assert world.unknown is not None and np.argwhere(world.unknown.any(axis=2)).tolist() == [[0, 10]]
 
 
-def test_nodata_without_text_is_none(tmp_path):
-    (tmp_path / "hills.tif").write_bytes(geotiff(heights(), tags=[(42113, "s", 0, " ", True)]))
+@pytest.mark.parametrize(
+    ("text", "kind"), [(" ", "f4"), ("nan", "i2"), ("-9999", "u2"), ("0.5", "u1"), ("-1e39", "u1")]
+)
+def test_nodata_that_the_raster_cannot_hold_is_none(tmp_path, text, kind):
+    samples = np.round(heights()).astype(kind)
+    samples[0, 0] = 0
+    (tmp_path / "hills.tif").write_bytes(geotiff(samples, tags=[(42113, "s", 0, text, True)]))
     assert load_world(tmp_path / "hills.tif").unknown is None
+
+
+def test_heights_that_are_none_are_named(tmp_path):
+    samples = heights()
+    samples[0, 0] = -3.4e38
+    (tmp_path / "hills.tif").write_bytes(geotiff(samples))
+    with pytest.raises(WorldError, match=r"along each axis; its heights are from -3.4e\+38 to .* m"):
+        load_world(tmp_path / "hills.tif")
 
 
 def keyed(*entries, **more):

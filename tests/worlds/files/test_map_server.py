@@ -261,6 +261,8 @@ def test_limits_of_shades_are_checked(tmp_path):
         (b"image: plan.pgm", b"image: !!python/object/apply:os.getcwd []", "aliases and tags"),
         (b"image: plan.pgm", b"image: nowhere.pgm", "exists"),
         (b"image: plan.pgm", b"image: map.yaml", "PNG, PGM, JPEG, BMP or GIF"),
+        (b"image: plan.pgm", b"image:\tplan.pgm", r"in YAML, but .* '\\t' that .* line 1, column 7"),
+        (b"image: plan.pgm", "image: Büro.pgm".encode("latin-1"), "in YAML, but .* position 8"),
     ],
 )
 def test_what_a_yaml_may_say(tmp_path, old, new, allowed):

@@ -41,6 +41,25 @@ def test_boxes_are_solid_where_they_are(tmp_path, kind, voxel_m):
     np.testing.assert_array_equal(world.occupied, solid)
 
 
+@pytest.mark.parametrize("unit_m", [1.0, 0.001, 0.3048])
+@pytest.mark.parametrize("kind", ["stl", "obj", "glb"])
+def test_walls_that_share_corners_with_a_floor_stay_as_thin_as_they_are(tmp_path, kind, unit_m):
+    """A corner of two bodies has no normal of its own, and files in float32 round places between voxels."""
+    boxes = np.array(
+        [
+            ((0, 0, 0), (7.3, 4.1, 0.1)),  # the floor
+            ((0, 0, 0.1), (7.3, 0.1, 2.0)),  # two walls on it, which meet in a corner
+            ((0, 0.1, 0.1), (0.1, 4.1, 2.0)),
+        ]
+    )
+    path = write(tmp_path, kind, boxes / unit_m)
+    world = load_world(path, 0.1, scale=unit_m, fill=False)
+    solid = np.zeros((73, 41, 20), bool)
+    solid[:, :, 0] = solid[:, 0, :] = solid[0, :, :] = True
+    assert world.grid.origin_m == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
+    np.testing.assert_array_equal(world.occupied, solid)
+
+
 @pytest.mark.parametrize("kind", ["obj", "stl", "glb", "ply"])
 @pytest.mark.parametrize("voxel_m", [0.1, 0.23])
 def test_long_thin_triangles_are_cut_small_enough(tmp_path, kind, voxel_m):
