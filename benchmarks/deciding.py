@@ -83,7 +83,7 @@ def weights_row(effort: Effort) -> Row:
 
 
 def decision_row(scenario: Scenario, robots: int, strategy: str, steps: int, most_ms: float) -> Row:
-    """Milliseconds a decision of a strategy in some steps of a mission, and their limit."""
+    """Return the row of milliseconds a decision of a strategy in some steps of a mission, and their limit."""
     env = EntropyExploreEnv(with_settings(scripted(scenario), {"robots": robots, "max_cycles": steps}))
     run_mission(env, make_strategy(strategy), 0)  # compiled now
     watch = Stopwatch(make_strategy(strategy), time.thread_time)

@@ -201,12 +201,12 @@ class Floor:
 
 
 def fusion_rows(effort: Effort) -> list[Row]:
-    """Rays a second beside OctoMap, and nanoseconds a voxel beside the floor, on both grids."""
+    """Return rows of rays a second beside OctoMap, and of nanoseconds a voxel beside the floor."""
     return [row for grid in GRIDS for row in grid_rows(grid, effort)]
 
 
 def grid_rows(grid: Grid, effort: Effort) -> list[Row]:
-    """Both rows of one grid."""
+    """Return both rows of one grid."""
     sensor = ROOM.sensor
     measurements = measure_room(grid, sensor, effort.scans)
     fusion, tree = Fusion(grid, sensor, measurements), OctoMapTree(grid.voxel_size_m)

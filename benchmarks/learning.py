@@ -93,7 +93,7 @@ def learning_rounds(
 
 
 def learning_rows(effort: Effort, words: tuple[str, ...] = ()) -> list[Row]:
-    """Robot-steps a second of the loop and of collecting, and the parts of the loop's time."""
+    """Return rows of robot-steps a second of the loop and of collecting, and the parts of the loop's time."""
     found = learning_rounds(THREADS, 8 if effort.large else 2, words)
     whole = {threads: [each["steps"] / each["seconds"] for each in own] for threads, own in found.items()}
     collecting = {

@@ -72,13 +72,13 @@ class Search:
         self._search, self._costs = new_search(covered.size), belief_costs(*belief, _PRIOR)
 
     def cost(self, start: int, goal: int) -> float:
-        """Cost of a path."""
+        """Return the cost of a path."""
         sources = np.array([start], np.int32)
         return search_paths(self._search, self._lattice, self._costs, sources, goal, math.inf)
 
 
 def planning_rows(effort: Effort) -> list[Row]:
-    """Voronoi cells of four sources beside SciPy, and a plan across a floor."""
+    """Return rows of Voronoi cells of four sources beside SciPy, and a plan across a floor."""
     maps = {
         "boxes": traversal_costs(cluttered(MAP, _MAP_SHARE)),
         "a maze": traversal_costs(maze(MAP)),
@@ -104,7 +104,7 @@ def voronoi_row(name: str, costs: np.ndarray, effort: Effort) -> Row:
 
 
 def crossing_row(shape: tuple[int, int, int], effort: Effort) -> Row:
-    """Milliseconds of a plan from corner to corner, for a body of 2½ cells."""
+    """Return the row of milliseconds of a plan from corner to corner, for a body of 2½ cells."""
     covered = cluttered(shape, _FLOOR_SHARE)
     corner = 12
     covered[:corner, :corner] = covered[-corner:, -corner:] = False

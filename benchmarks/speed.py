@@ -128,7 +128,7 @@ def cells(row: Row) -> tuple[str, ...]:
 
 
 def shown(value: float) -> str:
-    """Three digits, whole thousands in full."""
+    """Return a number with three digits; whole thousands are written in full."""
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 

@@ -31,7 +31,7 @@ def known_plan(seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
 
 
 def summary_rows(effort: Effort) -> list[Row]:
-    """Milliseconds to encode the plan, and to decode it."""
+    """Return rows of milliseconds to encode the plan, and to decode it."""
     mean, precision = known_plan()
     data = encode_map(mean, precision, _THRESHOLD_BITS)
     decode_map(data, mean.shape)

@@ -122,7 +122,7 @@ def _size(path: Path) -> int:
 
 
 def _writable(folder: Path) -> bool:
-    """Whether files can be made in it, or in the nearest folder above it that exists."""
+    """Return whether files can be made in it, or in the nearest folder above it that exists."""
     there = next((parent for parent in (folder, *folder.parents) if parent.exists()), None)
     if there is None or not there.is_dir():
         return False

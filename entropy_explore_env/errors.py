@@ -57,7 +57,7 @@ def one_of(value: object, known: Iterable[str]) -> str:
 
 
 def counted(number: int, noun: str) -> str:
-    """How many there are of something, as in `1 robot` and `3 robots`."""
+    """Return how many there are of something, as in `1 robot` and `3 robots`."""
     return f"{number} {noun}{'s' * (number != 1)}"
 
 

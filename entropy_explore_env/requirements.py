@@ -19,7 +19,7 @@ def needed() -> list[str]:
 
 
 def extras() -> dict[str, list[str]]:
-    """Extra of the library → the packages that it brings.
+    """Return, by extra of the library, the packages that it brings.
 
     `ray[rllib]` brings what Ray's own extra needs, too, as far as Ray is there to tell. What an extra takes
     from another one of ours stands there.
@@ -41,7 +41,7 @@ def pins() -> dict[str, dict[str, str]]:
 
 
 def _brought() -> dict[str, list[Requirement]]:
-    """Extra of the library → all that it brings."""
+    """Return, by extra of the library, all that it brings."""
     found: dict[str, list[Requirement]] = {}
     for extra, listed in _by_extra(_OURS).items():
         own = [each for each in listed if each.name != _OURS]

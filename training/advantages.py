@@ -143,7 +143,7 @@ class Steps(NamedTuple):
 def decision_advantages(
     steps: Steps, values: np.ndarray, last_values: np.ndarray, deciding: np.ndarray, discounting: Discounting
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Advantages of decisions by the equations above.
+    """Return the advantages of decisions by the equations above.
 
     Args:
         steps: The rollout.

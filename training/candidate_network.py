@@ -172,7 +172,7 @@ class CandidateActor(nn.Module):
         nn.init.zeros_(self.residual.bias)
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        """Logits (N, K) of observations (N, at least `parts.size`)."""
+        """Return the logits (N, K) of observations (N, at least `parts.size`)."""
         seen = seen_by_network(self.parts, observations)
         logits = self._planner(seen) + seen.candidates @ self.weights
         logits = logits + self.residual(self._tokens(seen))[:, :, 0]
@@ -214,7 +214,7 @@ class CandidateCritic(nn.Module):
         )  # fmt: skip
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        """Units (N, D) of observations (N, `parts.size` + P)."""
+        """Return the units (N, D) of observations (N, `parts.size` + P)."""
         seen = seen_by_network(self.parts, observations)
         tokens = self.each(seen.candidates) * seen.exists[:, :, None]
         mean = tokens.sum(dim=1) / seen.exists.sum(dim=1, keepdim=True)
@@ -233,11 +233,11 @@ class CandidateHeads(nn.Module):
         self.critic = CandidateCritic(parts, privileged, width)
 
     def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Logits (N, K) and the critic's units (N, D)."""
+        """Return the logits (N, K) and the critic's units (N, D)."""
         return self.actor(features), self.critic(features)
 
     def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
-        """Logits (N, K)."""
+        """Return the logits (N, K)."""
         return self.actor(features)
 
     def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
@@ -294,7 +294,7 @@ class CandidatePolicy(ActorCriticPolicy):
         self.actor.begin_as_planner()
 
     def _get_constructor_parameters(self) -> dict[str, Any]:
-        """Arguments that `save` stores, to make the policy again."""
+        """Return the arguments that `save` stores, to make the policy again."""
         parts, privileged, width, attention_layers = self._heads
         return super()._get_constructor_parameters() | {
             "parts": parts,

@@ -108,7 +108,7 @@ class VectorFeatures(BaseFeaturesExtractor):
         self.std.copy_(torch.as_tensor(std))
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        """Features (N, K) of observations (N, F)."""
+        """Return the features (N, K) of observations (N, F)."""
         normalised = (observations - self.mean) / self.std
         return normalised.index_select(1, self.places).clamp(-_CLIP, _CLIP)
 
@@ -139,7 +139,7 @@ class MapFeatures(VectorFeatures):
         self._features_dim += features * len(self._maps)
 
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
-        """Features (N, K) of observations (N, F)."""
+        """Return the features (N, K) of observations (N, F)."""
         seen = [super().forward(observations)]
         for name, part in self._maps.items():
             cells = observations[:, part.start : part.stop].reshape(-1, *part.shape)
@@ -240,11 +240,11 @@ class GazeHeads(nn.Module):
         self.register_buffer("places", torch.as_tensor(_places_around(*panorama)), persistent=False)
 
     def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Scores (N, moves + D) and the critic's units (N, hidden) of features (N, K)."""
+        """Return the scores (N, moves + D) and the critic's units (N, hidden) of features (N, K)."""
         return self.forward_actor(features), self.forward_critic(features)
 
     def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
-        """Scores of moves, then of gazes, (N, moves + D)."""
+        """Return the scores of moves, then of gazes, (N, moves + D)."""
         rays = features.index_select(1, self.places).reshape(len(features), -1, 2 * len(_AROUND))
         units = self.actor(features)
         looked = self.tanh(self.around(rays) + self.said(units)[:, None])
@@ -282,7 +282,7 @@ class GazePolicy(ActorCriticPolicy):
             nn.init.orthogonal_(last.weight, gain=0.01)
 
     def _get_constructor_parameters(self) -> dict[str, Any]:
-        """Arguments that `save` stores, to make the policy again."""
+        """Return the arguments that `save` stores, to make the policy again."""
         panorama, moves, hidden = self._heads
         return super()._get_constructor_parameters() | {
             "panorama": panorama,
@@ -360,7 +360,7 @@ def policy_keywords(
 
 
 def gazes_of(scenario: Scenario) -> tuple[int, int]:
-    """Yaws and pitches of a scenario's discrete gazes."""
+    """Return yaws and pitches of a scenario's discrete gazes."""
     return scenario.action.yaws, 1 if scenario.planar else scenario.action.pitches
 
 

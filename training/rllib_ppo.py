@@ -267,7 +267,7 @@ def iterate(
 
 
 def decisions_of(result: dict[str, Any]) -> float:
-    """Robots' decisions since the run began, from RLlib's result."""
+    """Return the number of decisions of robots since the run began, from RLlib's result."""
     return sum(result["env_runners"].get("num_agent_steps_sampled_lifetime", {}).values())
 
 
@@ -319,7 +319,7 @@ def last_checkpoint(folder: Path) -> Path | None:
 
 
 def iterations_of(checkpoint: Path) -> int:
-    """After how many iterations a checkpoint was written."""
+    """Return after how many iterations a checkpoint was written."""
     return int(checkpoint.name.rpartition("-")[2])
 
 

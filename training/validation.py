@@ -49,12 +49,12 @@ def pair_seeds(seed: int, part: int, pairs: int) -> list[int]:
 
 
 def learning_seeds(seed: int, missions: int) -> list[int]:
-    """Seeds of the missions that a run with this seed begins with."""
+    """Return the seeds of the missions that a run with this seed begins with."""
     return _drawn(seed, (0,), missions)
 
 
 def _drawn(seed: int, key: tuple[int, ...], missions: int) -> list[int]:
-    """Seeds of learning that follow from a run's seed and a key; others for every key."""
+    """Return the seeds of learning that follow from a run's seed and a key; others for every key."""
     sequence = np.random.SeedSequence(entropy=seed, spawn_key=key)
     return [_LEARNING + int(drawn) for drawn in sequence.generate_state(missions, np.uint64)]
 

@@ -106,7 +106,7 @@ _ROWS: tuple[tuple[str, str, Callable[[Any], str]], ...] = (
 
 
 def named(figures: dict[str, Any]) -> str:
-    """Scenario and, where it says more, its world."""
+    """Return the scenario and, where it says more, its world."""
     same = figures["world"] in ("empty", "furnished", figures["scenario"])
     return figures["scenario"] if same else f"{figures['scenario']} ({figures['world']})"
 

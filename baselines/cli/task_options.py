@@ -226,7 +226,7 @@ def tasked(
 
 
 def _kinds(words: str) -> tuple[RobotKind, ...]:
-    """Kinds of robots from JSON, or from a file of it."""
+    """Return the kinds of robots from JSON, or from a file of it."""
     allowed = "JSON, or a file of it: a list of objects with robot and sensor"
     kinds = given_json("extra_kinds", words, allowed)
     if not isinstance(kinds, list):
@@ -335,6 +335,6 @@ def settled(options: TaskOptions) -> TaskOptions:
 
 
 def absolute_files(files: Iterable[str]) -> tuple[str, ...]:
-    """World files as absolute paths; a name that is no file stays."""
+    """Return the world files as absolute paths; a name that is no file stays."""
     paths = ((file, Path(file).expanduser()) for file in files)
     return tuple(str(path.absolute()) if path.is_file() else file for file, path in paths)

@@ -66,14 +66,14 @@ def central_range(values: Sample) -> Range:
 
 
 def ratio_interval(numerator: Sample, denominator: Sample) -> Interval:
-    """Ratio of two means over the same seeds, and its interval (paired bootstrap)."""
+    """Return the ratio of two means over the same seeds, and its interval (paired bootstrap)."""
     pairs = np.stack([np.asarray(numerator, float), np.asarray(denominator, float)], axis=1)
     means = _resampled(pairs, len(pairs)).mean(axis=1)
     return Interval(float(pairs[:, 0].mean() / pairs[:, 1].mean()), *_central(means[:, 0] / means[:, 1]))
 
 
 def median_ratio_interval(numerator: Sample, denominator: Sample) -> Interval:
-    """Ratio of two medians over the same seeds, and its interval (paired bootstrap)."""
+    """Return the ratio of two medians over the same seeds, and its interval (paired bootstrap)."""
     pairs = np.stack([np.asarray(numerator, float), np.asarray(denominator, float)], axis=1)
     medians = np.median(_resampled(pairs, len(pairs)), axis=1)
     ratio = float(np.median(pairs[:, 0]) / np.median(pairs[:, 1]))
@@ -81,7 +81,7 @@ def median_ratio_interval(numerator: Sample, denominator: Sample) -> Interval:
 
 
 def geometric_ratio_interval(ours: Sequence[Sample], theirs: Sequence[Sample]) -> Interval:
-    """Geometric mean over tasks of the geometric mean of paired ratios in each, and its interval.
+    """Return the geometric mean over tasks of the geometric mean of paired ratios in each, and its interval.
 
     exp( 1/S Σ_s 1/N_s Σ_i ln(ours_si / theirs_si) ); the bootstrap draws pairs within each task.
 
@@ -129,7 +129,7 @@ def paired_p(smaller: np.ndarray, larger: np.ndarray) -> float:
 
 
 def holm(p_values: Sequence[float]) -> np.ndarray:
-    """p-values corrected for their number (Holm 1979)."""
+    """Return the p-values corrected for their number (Holm 1979)."""
     p = np.asarray(p_values, float)
     order = np.argsort(p, kind="stable")
     scaled = np.maximum.accumulate(p[order] * np.arange(len(p), 0, -1))

@@ -52,7 +52,7 @@ def cells_table(
 
 
 def csv_table(columns: Mapping[str, Sequence[object]]) -> str:
-    """Columns of equal length as CSV."""
+    """Return columns of equal length as CSV."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([tuple(columns), *zip(*columns.values(), strict=True)])
     return text.getvalue()

@@ -190,7 +190,7 @@ def _attempt(work: Callable[[Any], Any], task: object) -> Any:  # noqa: ANN401 -
 
 
 def _one_line(error: BaseException) -> str:
-    """Kind and message of an error."""
+    """Return the kind and message of an error."""
     said = " ".join(str(error).split())
     return f"{type(error).__name__}: {said}" if said else type(error).__name__
 

@@ -156,7 +156,7 @@ def check(
 
 
 def resident_mib() -> float:
-    """Resident memory of this process in MiB; nan where the system does not tell."""
+    """Return the resident memory of this process in MiB; nan where the system does not tell."""
     try:
         pages = int(Path("/proc/self/statm").read_text("ascii").split()[1])
     except OSError:

@@ -83,7 +83,7 @@ def pcd(encoding: str) -> bytes:
 
 
 def ply(binary: bool) -> bytes:
-    """Points only, by hand."""
+    """Return a PLY of points only, written by hand."""
     some = points()
     form = b"binary_little_endian" if binary else b"ascii"
     head = b"ply\nformat %s 1.0\nelement vertex %d\n" % (form, len(some))

@@ -42,7 +42,7 @@ class ElevationMap(NamedTuple):
 def elevation_map(
     mean: np.ndarray, precision: np.ndarray, grid: Grid, sigma_prior: float, sigma_min: float
 ) -> ElevationMap:
-    """Heights of the ground in a voxel belief.
+    """Return heights of the ground in a voxel belief.
 
     The ground of a column ends in its highest measured voxel with a mean coverage μ above ½, at the height
     vsz·(k + μ) above the floor; its standard deviation is that of the coverage, times vsz. Where no voxel is
@@ -135,7 +135,7 @@ def completed(
 
 
 def _relaxed(heights: np.ndarray, fixed: np.ndarray, tolerance: float) -> np.ndarray:
-    """Heights with those that are not fixed relaxed.
+    """Return heights with those that are not fixed relaxed.
 
     The slowest error over a gap of D columns that ends at the border falls by ρ = (1 + cos(π/(2D + 1)))/2 in
     a sweep of Jacobi's; the best factor for it is ω = 2/(1 + √(1 - ρ²)) (Young 1954).

@@ -12,7 +12,7 @@ from entropy_explore_env.settings.ending import BITS_OF_UNIT_GAUSSIAN
 
 
 def map_entropy_bits(precision: np.ndarray) -> np.ndarray:
-    """Entropy of whole maps, H = Σ log2 √(2πe) + log2 σ (Rocha04, eqs. 15 and 25).
+    """Return the entropy of whole maps, H = Σ log2 √(2πe) + log2 σ (Rocha04, eqs. 15 and 25).
 
     Args:
         precision: (..., X, Y, Z) float32, 1/σ².

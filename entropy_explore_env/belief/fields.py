@@ -25,7 +25,7 @@ class Belief(NamedTuple):
 
 @inlined_kernel
 def entropy_gradient(precision, i, j, k, voxel_size_m):
-    """Backward difference of the voxel entropy (Rocha04, eq. 30).
+    """Return the backward difference of the voxel entropy (Rocha04, eq. 30).
 
         ∇h(l) ≈ 1/vsz · [h(l) - h(l_x-), h(l) - h(l_y-), h(l) - h(l_z-)]
 
@@ -56,7 +56,7 @@ def remaining_bits(precision, known_precision):
 
 @inlined_kernel
 def remaining_entropy_gradient(precision, i, j, k, known_precision):
-    """`entropy_gradient` of `remaining_bits`, in bits per voxel edge: 0 between known voxels."""
+    """Return the `entropy_gradient` of `remaining_bits`, in bits per voxel edge: 0 between known voxels."""
     here = remaining_bits(precision[i, j, k], known_precision)
     along_x = here - remaining_bits(precision[i - 1, j, k], known_precision) if i > 0 else 0.0
     along_y = here - remaining_bits(precision[i, j - 1, k], known_precision) if j > 0 else 0.0
@@ -66,7 +66,7 @@ def remaining_entropy_gradient(precision, i, j, k, known_precision):
 
 @inlined_kernel
 def occupancy_probability(mean, precision):
-    """P(c > ½) of a coverage c ~ N(μ, 1/√precision) cut to [0, 1] (Rocha04, eq. 6, for its γ)."""
+    """Return P(c > ½) of a coverage c ~ N(μ, 1/√precision) cut to [0, 1] (Rocha04, eq. 6, for its γ)."""
     scale = math.sqrt(precision) * _SQRT_HALF
     below = math.erf((0.5 - mean) * scale) - math.erf(-mean * scale)
     above = math.erf((1.0 - mean) * scale) - math.erf((0.5 - mean) * scale)

@@ -30,7 +30,7 @@ _EDGE = 0.5 + 0.8660254037844387
 
 @inlined_kernel
 def measurement_precision(range_m, sigma_min, sigma_slope_per_m, sigma_exponent):
-    """Precision of the coverage that one ray measures, 1/σ(d)² with σ(d) = σ_min + ζ·dⁿ.
+    """Return the precision of the coverage that one ray measures, 1/σ(d)² with σ(d) = σ_min + ζ·dⁿ.
 
     With n = 1 that is Rocha04's eq. 5; stereo cameras have n = 2 (Sujan, eq. 4: σ = S·T·Lⁿ).
     """
@@ -41,7 +41,7 @@ def measurement_precision(range_m, sigma_min, sigma_slope_per_m, sigma_exponent)
 
 @inlined_kernel
 def measured_coverage(start, length, size, crossing, n, coverage):
-    """Coverage that a hit at `length` says of the voxels on its ray (Rocha04, eq. 4).
+    """Return the coverage that a hit at `length` says of the voxels on its ray (Rocha04, eq. 4).
 
         μ(dˡ, d) = clip(½ + (dˡ - d)/vsz, 0, 1)
 

@@ -32,7 +32,7 @@ class Cells(NamedTuple):
 
 
 def new_cells(size: tuple[int, int, int], shape: tuple[int, int, int]) -> Cells:
-    """Cells that cut each axis into as equal parts as whole voxels allow.
+    """Return cells that cut each axis into as equal parts as whole voxels allow.
 
     Args:
         size: (X, Y, Z) voxels.
@@ -48,13 +48,13 @@ def new_cells(size: tuple[int, int, int], shape: tuple[int, int, int]) -> Cells:
 
 
 def no_cells(size: tuple[int, int, int]) -> Cells:
-    """No cells at all: nothing is pooled."""
+    """Return no cells at all: nothing is pooled."""
     none = np.zeros(0, np.int64)
     return Cells(size, none, none, none, np.zeros(0))
 
 
 def fresh_sums(cells: Cells) -> np.ndarray:
-    """(2, C) float64 sums of a belief that nothing has measured: normalised entropy, coverage."""
+    """Return (2, C) float64 sums of a belief that nothing has measured: normalised entropy, coverage."""
     return np.stack([cells.voxels, PRIOR_MEAN * cells.voxels])
 
 

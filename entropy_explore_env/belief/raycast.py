@@ -96,13 +96,13 @@ class _AxisStart(NamedTuple):
 
 @inlined_kernel
 def point(array):
-    """(x, y, z), the first three numbers of an array, as a tuple."""
+    """Return (x, y, z), the first three numbers of an array, as a tuple."""
     return array[0], array[1], array[2]
 
 
 @lean_kernel
 def longest_crossing(size_x, size_y, size_z, length, voxels_behind):
-    """Most voxels that a ray can cross: the scratch space that `cast_ray` needs.
+    """Return the most voxels that a ray can cross: the scratch space that `cast_ray` needs.
 
     Args:
         size_x: Voxels of the workspace along x.

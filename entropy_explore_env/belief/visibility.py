@@ -38,7 +38,7 @@ _SLACK = 1e-9
 
 
 def cone_of(viewpoint: np.ndarray, radius: float, half_angle_rad: float) -> np.ndarray:
-    """() CONE from a viewpoint (5,): x, y, z in grid units, yaw, pitch; radius in voxel edges."""
+    """Return the () CONE of a viewpoint (5,): x, y, z in grid units, yaw, pitch; radius in voxel edges."""
     cone = np.zeros((), CONE)
     yaw, pitch = float(viewpoint[3]), float(viewpoint[4])
     cone["apex"] = viewpoint[:3]
@@ -57,7 +57,7 @@ def in_cone(cone, dx, dy, dz):
 
 @inlined_kernel
 def _column_span(cone, dx, dy, layers):
-    """First and one past the last layer of a column of voxels in which centres may lie in a cone.
+    """Return the first and one past the last layer of a column of voxels whose centres may lie in a cone.
 
     The column stands at (dx, dy) from the apex. Up to α = 90° a cone is convex and what is in it lies between
     two heights, the roots of (A + gz)² = cos²α (dx² + dy² + z²), checked for rounding; beyond, they are those
@@ -98,14 +98,14 @@ def _column_span(cone, dx, dy, layers):
 
 @inlined_kernel
 def _visible(cone, i, j, k):
-    """Whether a voxel of a column's span is visible."""
+    """Return whether a voxel of a column's span is visible."""
     dx, dy, dz = i + 0.5 - cone.apex[0], j + 0.5 - cone.apex[1], k + 0.5 - cone.apex[2]
     return cone.cosine >= 0.0 or in_cone(cone, dx, dy, dz)
 
 
 @inlined_kernel
 def _span(cone, axis, size):
-    """First and one past the last index along an axis whose centres may lie in a cone.
+    """Return the first and one past the last index along an axis whose centres may lie in a cone.
 
     No direction in the cone comes nearer to the axis than its angle from the gaze less α.
     """

@@ -129,7 +129,7 @@ def _difference(one: tuple[Any, ...], two: tuple[Any, ...]) -> str:
 
 
 def snapshot(env: EntropyExploreEnv | EntropyExploreVectorEnv) -> Leaves:
-    """All that a call may change."""
+    """Return all that a call may change."""
     missions: Missions = env.missions
     kept = {"seeds": missions.seeds, "episodes": missions.episodes, "observations": missions.observations}
     given = {"starts": [options.starts for options in missions.options], "worlds": missions.worlds}

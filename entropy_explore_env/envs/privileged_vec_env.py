@@ -33,7 +33,7 @@ class _PrivilegedVectorEnv(EntropyExploreVectorEnv):
         return short_repr(spaces.Box(low, high, dtype=np.float32))
 
     def _vectors(self) -> np.ndarray:
-        """(E, A, F + P) float32."""
+        """Return (E, A, F + P) float32."""
         return np.concatenate([self.missions.observations, privileged_numbers(self.missions)], axis=2)
 
 

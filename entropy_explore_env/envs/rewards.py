@@ -140,7 +140,7 @@ class StepRewards:
 
 
 def _driven_m(missions: Missions) -> np.ndarray:
-    """(E, A) float64 metres that robots have driven up to now."""
+    """Return (E, A) float64 metres that robots have driven up to now."""
     driven_m = np.empty(missions.state.robots.shape)
     driven_metres(missions.rules.params, missions.state.missions, missions.state.robots, driven_m)
     return driven_m

@@ -243,20 +243,20 @@ class RobotVecEnv(VecEnv):
             }
 
     def _of_robot(self, team: Any, robot: int) -> Any:  # noqa: ANN401 - an array, or a dict of them
-        """One robot's observation from those of its team; a single robot has no axis of its own."""
+        """Return one robot's observation from those of its team; a single robot has no axis of its own."""
         if isinstance(team, dict):
             return {name: self._of_robot(part, robot) for name, part in team.items()}
         return team if self._robots == 1 else team[robot]
 
     def _rows(self, observations: Any) -> Any:  # noqa: ANN401 - an array, or a dict of them
-        """(E, A, ...) as (N, ...)."""
+        """Return (E, A, ...) as (N, ...)."""
         if isinstance(observations, dict):
             return {name: self._rows(part) for name, part in observations.items()}
         skipped = 1 if self._robots == 1 else 2
         return observations.reshape(self.num_envs, *observations.shape[skipped:])
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """All that changes, as arrays without Python objects; see `missions.snapshot`."""
+        """Return all that changes, as arrays without Python objects; see `missions.snapshot`."""
         rows = {name: getattr(self, name).copy() for name in _CARRIED}
         return rows | snapshot(self.vector_env.missions)
 

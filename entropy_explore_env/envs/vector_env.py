@@ -129,7 +129,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         return self.missions.layout.space()
 
     def _vectors(self) -> np.ndarray:
-        """(E, A, F) float32, a new array: what the robots observe at this moment."""
+        """Return (E, A, F) float32, a new array: what the robots observe at this moment."""
         return self.missions.observations.copy()
 
     def reset(
@@ -251,7 +251,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         }
 
     def _of_robots(self, values: np.ndarray) -> np.ndarray:
-        """Values (E, A, ...) of the robots; one robot has no axis of its own."""
+        """Return values (E, A, ...) of the robots; one robot has no axis of its own."""
         return values[:, 0] if self.scenario.robots == 1 else values
 
     def _observations(self) -> np.ndarray | dict[str, np.ndarray]:

@@ -247,7 +247,7 @@ def choose_candidate(blocks, block):
 
 @inlined_kernel
 def _meets_edge(blocks, x, y, z):
-    """Whether the footprint in a cell meets the edge."""
+    """Return whether the footprint in a cell meets the edge."""
     for offset in blocks.footprint:
         near = cell_at(blocks.size, x + offset[0], y + offset[1], z + offset[2])
         if near != NONE and blocks.flags[near] & (EDGE | DROPPED) == EDGE:

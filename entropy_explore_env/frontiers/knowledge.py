@@ -51,7 +51,7 @@ def teammates_that_share(view: RobotKnowledge) -> Mapping[int, TeammateView]:
 
 
 def under_way(view: RobotKnowledge, mate: TeammateView, robot: int) -> bool:
-    """Whether a teammate, by what was heard of it, is on its way to the viewpoint that it announced.
+    """Return whether a teammate, by what was heard of it, is on its way to the viewpoint that it announced.
 
     It is until a scan from there is heard, or until so much time has passed that it must have arrived: then
     it is out of the channel's range, or its messages were lost. Scans that are taken during a drive do not
@@ -70,7 +70,7 @@ def under_way(view: RobotKnowledge, mate: TeammateView, robot: int) -> bool:
 
 
 def stays(view: RobotKnowledge, mate: TeammateView) -> bool:
-    """Whether a teammate waits: the viewpoint that it announced is where it was before."""
+    """Return whether a teammate waits: the viewpoint that it announced is where it was before."""
     apart_m = float(np.linalg.norm(mate.pose[:3] - mate.viewpoint[:3]))
     return apart_m < 0.5 * view.scenario.grid.voxel_size_m
 

@@ -31,7 +31,7 @@ def open_tour(lengths: np.ndarray) -> np.ndarray:
 
 
 def tour_length(lengths: np.ndarray, tour: np.ndarray) -> float:
-    """Length of an open tour."""
+    """Return the length of an open tour."""
     return float(lengths[tour[:-1], tour[1:]].sum())
 
 

@@ -61,7 +61,7 @@ class KnownPaths:
             self.reach = reach
 
     def exhausted(self) -> bool:
-        """Whether the search has found all that can be reached."""
+        """Return whether the search has found all that can be reached."""
         return math.isinf(self.reach) or self.search.queue.state[0]["entries"] == 0
 
     def frontiers_within(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
@@ -179,7 +179,7 @@ class KnownPaths:
         return int(drawn[nearer[np.argmax(apart[nearer])]]) if len(nearer) else NONE
 
     def is_line_free(self, first: np.ndarray, second: np.ndarray) -> bool:
-        """Whether the straight line between two places (3,), in voxel edges, is known to be free."""
+        """Return whether the straight line between two places (3,), in voxel edges, is known to be free."""
         ends = [(float(p[0]), float(p[1]), float(p[2])) for p in (first, second)]
         cost = line_of_sight_cost(self.search, self.lattice, self.costs, ends[0], ends[1])
         return math.isfinite(cost)

@@ -174,7 +174,7 @@ def _find_room(terrain, block):
 
 @lean_kernel
 def _may_fly(terrain, x, y, z):
-    """Whether a body's footprint is above mapped ground, below the ceiling and not covered."""
+    """Return whether a body's footprint is above mapped ground, below the ceiling and not covered."""
     size = terrain.size
     for offset in terrain.footprint:
         i, j, k = x + offset[0], y + offset[1], z + offset[2]

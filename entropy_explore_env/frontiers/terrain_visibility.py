@@ -53,7 +53,7 @@ def mean_ground(terrain, x, y, patch):
 
 @inlined_kernel
 def height_at(terrain, x, y, eye, average, reach):
-    """Height of a column: its ground if mapped, else extrapolated (sect. 3.4), 0 out of reach."""
+    """Return the height of a column: its ground if mapped, else extrapolated (sect. 3.4), 0 out of reach."""
     if terrain.ground[x, y] != NONE:
         return np.float64(terrain.ground[x, y])
     dx, dy = x + 0.5 - eye[0], y + 0.5 - eye[1]

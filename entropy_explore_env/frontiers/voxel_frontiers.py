@@ -136,7 +136,7 @@ class VoxelFrontiers(FrontierMap):
         return opened
 
     def is_frontier(self, voxel: int) -> bool:
-        """Whether a voxel is a frontier cell."""
+        """Return whether a voxel is a frontier cell."""
         return bool(self._marks[voxel] & CANDIDATE)
 
     def opening(self, voxel: int, most: int) -> int:

@@ -88,7 +88,7 @@ def _find_room(blocks, cost, block):
 
 @lean_kernel
 def _may_stand(blocks, x, y, z):
-    """Whether the body's footprint is mapped, believed free and inside the workspace."""
+    """Return whether the body's footprint is mapped, believed free and inside the workspace."""
     for offset in blocks.footprint:
         up = z + offset[2]
         if blocks.layer >= 0 and not 0 <= up < blocks.size[2]:

@@ -184,11 +184,11 @@ class CompiledStep:
         compile_ahead([(step_missions, step), *plans])
 
     def estimates_of(self, state: MissionState) -> np.ndarray | None:
-        """(E, A) ESTIMATE, what robots believe of their poses; None = all know where they are."""
+        """Return (E, A) ESTIMATE, what robots believe of their poses; None = all know where they are."""
         return None if self._rules.localization is None else state.estimates
 
     def action_masks(self, state: MissionState) -> np.ndarray:
-        """(E, A, N) int8; see `Missions.action_masks`."""
+        """Return (E, A, N) int8; see `Missions.action_masks`."""
         if self.proposes:
             running = state.missions["end"] == MissionEnd.RUNNING.code
             decides = state.robots["deciding"] & running[:, None]

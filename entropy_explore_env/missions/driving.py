@@ -310,7 +310,7 @@ def end_drive(params, robot, passed, time_s):
 
 @lean_kernel
 def believed_corner(estimate, params, corner):
-    """(x, y, z) of a path's corner, in the workspace, where a robot believes it to be."""
+    """Return (x, y, z) of a path's corner, in the workspace, where a robot believes it to be."""
     x, y, z = believed_point(estimate, point(corner))
     if estimate is None:  # known while compiling: nothing of the rest is compiled
         return x, y, z
@@ -319,7 +319,7 @@ def believed_corner(estimate, params, corner):
 
 @lean_kernel
 def rest_blocked(params, footprint, mean, robot, estimate, passed, crossing):
-    """Whether the rest of a planned path, from where the robot scanned, is believed blocked."""
+    """Return whether the rest of a planned path, from where the robot scanned, is believed blocked."""
     size, radius = grid_size(params), params.body_radius_m / params.voxel_size_m
     start = within_grid(params, believed_pose(estimate, params, robot.scan_pose))
     for number in range(passed, robot.waypoints):

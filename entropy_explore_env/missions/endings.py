@@ -40,7 +40,7 @@ def mission_end(mission):
 
 @lean_kernel
 def mapped_enough(team, clock):
-    """Whether those maps that have to have passed the threshold of entropy (Rocha04, eq. 41)."""
+    """Return whether those maps that have to pass the threshold of entropy have done so (Rocha04, eq. 41)."""
     shared, passed, missing = team.params[0], 0, 0
     for index in range(len(team.robots)):
         if (shared.shared_maps or shared.one_map) and gone(team.faults, index):
@@ -76,7 +76,7 @@ def seen_enough(mission):
 
 @lean_kernel
 def exhausted(mission):
-    """Whether the team has long seen nothing new, and no robot has a place left to drive up to.
+    """Return whether the team has long seen nothing new, and no robot has a place left to drive up to.
 
     The team must have measured every voxel that can be seen and lies where a body of the team can get to from
     its start, or beside such a place; where own maps count, every robot that still works must have it in its

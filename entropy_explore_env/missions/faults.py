@@ -50,7 +50,7 @@ def draw_faults(scenario: Scenario, seed: int, episode: int, states: np.ndarray)
 
 
 def _outage_s(outage: Outage, robot: int, share: float) -> tuple[float, float]:
-    """When an outage of a robot begins and ends; `share` is drawn uniformly from [0, 1)."""
+    """Return when an outage of a robot begins and ends; `share` is drawn uniformly from [0, 1)."""
     if outage.robots and robot not in outage.robots:
         return math.inf, math.inf
     drawn_s = math.inf if math.isinf(outage.mean_s) else -outage.mean_s * math.log1p(-share)
@@ -59,7 +59,7 @@ def _outage_s(outage: Outage, robot: int, share: float) -> tuple[float, float]:
 
 
 def failing(states: np.ndarray, time_s: np.ndarray | float) -> dict[str, np.ndarray]:
-    """Which robots, of (…, A) FAULT, stand still, are blind or silent at a time, a number or (…, 1).
+    """Return which robots, of (…, A) FAULT, stand still, are blind or silent at a time, a number or (…, 1).
 
     Returns:
         `stopped`, `blind` and `silent`, (…, A) bool. A robot that stands still is said to be neither of the
@@ -83,7 +83,7 @@ def fault_counts(states: np.ndarray) -> dict[str, int]:
 
 @lean_kernel
 def faults_of(params, states, mission):
-    """TeamFaults of a mission; None where there are none."""
+    """Return the TeamFaults of a mission; None where there are none."""
     if params is None:  # known while compiling: nothing of the rest is compiled
         return None
     return TeamFaults(params, states[mission])
@@ -91,7 +91,7 @@ def faults_of(params, states, mission):
 
 @lean_kernel
 def next_stop(faults):
-    """(robot, time) of the next robot that stops; the time is inf if none does."""
+    """Return (robot, time) of the next robot that stops; the time is inf if none does."""
     soonest, soonest_s = 0, math.inf
     if faults is None:  # known while compiling: nothing of the rest is compiled
         return soonest, soonest_s
@@ -104,7 +104,7 @@ def next_stop(faults):
 
 @lean_kernel
 def stops_counted(faults):
-    """How many robots have stopped so far."""
+    """Return how many robots have stopped so far."""
     if faults is None:  # known while compiling: nothing of the rest is compiled
         return 0
     stops = 0
@@ -124,7 +124,7 @@ def note_stop(faults, index):
 
 @lean_kernel
 def gone(faults, index):
-    """Whether a robot has stopped for good."""
+    """Return whether a robot has stopped for good."""
     if faults is None:  # known while compiling: nothing of the rest is compiled
         return False
     state = faults.states[index]
@@ -133,7 +133,7 @@ def gone(faults, index):
 
 @lean_kernel
 def all_gone(faults):
-    """Whether all robots have stopped for good."""
+    """Return whether all robots have stopped for good."""
     if faults is None:  # known while compiling: nothing of the rest is compiled
         return False
     for index in range(len(faults.states)):
@@ -144,7 +144,7 @@ def all_gone(faults):
 
 @lean_kernel
 def switched_off(faults, index, time_s):
-    """Whether a robot stands still by a fault."""
+    """Return whether a robot stands still by a fault."""
     if faults is None:  # known while compiling: nothing of the rest is compiled
         return False
     state = faults.states[index]
@@ -153,7 +153,7 @@ def switched_off(faults, index, time_s):
 
 @lean_kernel
 def radio_silent(faults, index, time_s):
-    """Whether a robot neither sends nor hears."""
+    """Return whether a robot neither sends nor hears."""
     if faults is None:  # known while compiling: nothing of the rest is compiled
         return False
     state = faults.states[index]
@@ -170,7 +170,7 @@ def count_silenced(faults, index, count):
 
 @lean_kernel
 def draw_lateness(faults, index):
-    """Seconds that a robot's radio holds back the message that it is to send now."""
+    """Return the seconds that a robot's radio holds back the message that it is to send now."""
     if faults is None:  # known while compiling: nothing of the rest is compiled
         return 0.0
     params, state = faults.params[index], faults.states[index]
@@ -182,7 +182,7 @@ def draw_lateness(faults, index):
 
 @lean_kernel
 def takes_in(faults, robot, index, time_s, bits):
-    """Whether a robot's radio hands over a message that reaches it now; counts what goes wrong.
+    """Return whether a robot's radio hands over a message that reaches it now; counts what goes wrong.
 
     Args:
         robot: ROBOT; hears a message that arrives twice a second time.
@@ -206,7 +206,7 @@ def takes_in(faults, robot, index, time_s, bits):
 
 @lean_kernel
 def blinded(faults, index, time_s):
-    """Whether a robot's scans measure nothing by a fault."""
+    """Return whether a robot's scans measure nothing by a fault."""
     if faults is None:  # known while compiling: nothing of the rest is compiled
         return False
     state = faults.states[index]

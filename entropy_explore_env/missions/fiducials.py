@@ -24,7 +24,7 @@ _NEAREST_M = 1e-6
 
 
 def fiducial_places(scenario: Scenario, world: World, seed: int, episode: int) -> np.ndarray:
-    """Where a mission's fiducials are, drawn or given.
+    """Return where a mission's fiducials are, drawn or given.
 
     Drawn ones are on surfaces of voxels that robots can see: of a team that stays in planes, in these planes.
 
@@ -102,7 +102,7 @@ def sight_fiducials(localization, params, index, sensor, scene, pose):
 
 @inlined_kernel
 def way_to(place, other):
-    """(x, y, z) from one place to another."""
+    """Return the way (x, y, z) from one place to another."""
     return other[0] - place[0], other[1] - place[1], other[2] - place[2]
 
 

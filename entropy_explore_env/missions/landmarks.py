@@ -102,7 +102,7 @@ def worst_landmark(landmarks):
 
 @lean_kernel
 def apart(landmarks, slot, point, apart_m):
-    """Whether a point is so far from all landmarks but the one that it would replace."""
+    """Return whether a point is so far from all landmarks but the one that it would replace."""
     for number in range(len(landmarks)):
         landmark = landmarks[number]
         if number != slot and landmark.used and length(way_to(landmark.believed, point)) < apart_m:

@@ -61,7 +61,7 @@ def begin_estimates(seed: int, episode: int, poses: np.ndarray, estimates: np.nd
 
 
 def pose_errors(estimates: np.ndarray) -> list[tuple[float, float]]:
-    """How wrong one mission's robots were about their poses at the latest changes of their estimates.
+    """Return how wrong one mission's robots were about their poses at the latest changes of their estimates.
 
     Returns:
         Of each robot, the distance in metres between where it believed to be and where it was, and what its
@@ -71,7 +71,7 @@ def pose_errors(estimates: np.ndarray) -> list[tuple[float, float]]:
 
 
 def localization_figures(estimates: np.ndarray, scans: int) -> dict[str, float | int | None]:
-    """How wrong a team was about its poses, for tables and records.
+    """Return how wrong a team was about its poses, for tables and records.
 
     Args:
         scans: That it has taken.
@@ -94,7 +94,7 @@ def localization_figures(estimates: np.ndarray, scans: int) -> dict[str, float |
 
 @lean_kernel
 def localization_of(params, estimates, fiducials, landmarks, mission):
-    """TeamLocalization of a mission; None where no robot drifts."""
+    """Return the TeamLocalization of a mission; None where no robot drifts."""
     if params is None:  # known while compiling: nothing of the rest is compiled
         return None
     return TeamLocalization(params, estimates[mission], fiducials[mission], landmarks[mission])
@@ -102,7 +102,7 @@ def localization_of(params, estimates, fiducials, landmarks, mission):
 
 @lean_kernel
 def estimate_of(localization, index):
-    """ESTIMATE of a robot; None where no robot drifts."""
+    """Return the ESTIMATE of a robot; None where no robot drifts."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return None
     return localization.estimates[index]
@@ -110,7 +110,7 @@ def estimate_of(localization, index):
 
 @lean_kernel
 def estimate_in(estimates, mission, index):
-    """ESTIMATE of a robot of a mission, out of (E, A) ESTIMATE; None where there are none."""
+    """Return the ESTIMATE of a robot of a mission, out of (E, A) ESTIMATE; None where there are none."""
     if estimates is None:  # known while compiling: nothing of the rest is compiled
         return None
     return estimates[mission, index]
@@ -253,7 +253,7 @@ def note_scan_pose(localization, index, pose):
 
 @lean_kernel
 def believed_scan_pose(localization, robot, index):
-    """(x, y, z, yaw, pitch) where a robot believes to have taken its latest scan."""
+    """Return (x, y, z, yaw, pitch) where a robot believes to have taken its latest scan."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return whole_pose(robot.scan_pose)
     return whole_pose(localization.estimates[index].scan_pose)
@@ -261,7 +261,7 @@ def believed_scan_pose(localization, robot, index):
 
 @lean_kernel
 def whole_pose(pose):
-    """(x, y, z, yaw, pitch) from an array (5,)."""
+    """Return (x, y, z, yaw, pitch) from an array (5,)."""
     return pose[0], pose[1], pose[2], pose[3], pose[4]
 
 

@@ -112,7 +112,7 @@ def _world_bytes(scenario: Scenario, batch: Batch) -> int:
 
 
 def _scratch_needs(scenario: Scenario, batch: Batch) -> list[Need]:
-    """Scratch memory of each thread, and what all share of actions."""
+    """Return the scratch memory that each thread needs, and what all share of actions."""
     voxels, sensors = scenario.grid.voxels, [kind.sensor for kind in scenario.kinds]
     scans = scan_bytes(scenario.grid, sensors, max(sensor.rays for sensor in sensors))
     plans = any(kind.robot.navigator == "planned" for kind in scenario.kinds) * _SEARCH_BYTES * voxels

@@ -210,7 +210,7 @@ def transmit(team, index, place, time_s, messages, recipients):
 
 @lean_kernel
 def passes(air, team, mate, place, time_s):
-    """Whether walls, and the distance, let a message through to a teammate.
+    """Return whether walls, and the distance, let a message through to a teammate.
 
     Args:
         mate: The teammate that is to hear it.
@@ -365,7 +365,7 @@ def receive(team, maps, in_flight, slot, tracer, scan):
 
 @lean_kernel
 def next_message(messages):
-    """(slot, time) of the next message that arrives, the earlier sent first; time inf if none."""
+    """Return (slot, time) of the next message that arrives, the earlier sent first; time inf if none."""
     soonest, due_s = 0, math.inf
     for slot in range(len(messages)):
         due = messages[slot].due_s

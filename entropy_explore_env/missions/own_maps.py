@@ -38,7 +38,7 @@ class TeamSummaries(NamedTuple):
 
 @lean_kernel
 def summaries_of(tree, state, mission):
-    """TeamSummaries of a mission; None where robots send no summaries."""
+    """Return the TeamSummaries of a mission; None where robots send no summaries."""
     if tree is None:  # known while compiling: nothing of the rest is compiled
         return None
     return TeamSummaries(

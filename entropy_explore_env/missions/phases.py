@@ -37,7 +37,7 @@ _MISSING, _HAS_IT, _AGAIN, _NOW = 0, 1, 2, 3
 
 @lean_kernel
 def next_broadcast(params, phases):
-    """When the robots broadcast next; inf where batches are sent at once."""
+    """Return when the robots broadcast next; inf where batches are sent at once."""
     if params.phase_s == 0.0:
         return math.inf
     return (phases.broadcasts + 1) * (params.phase_s / params.repeats)

@@ -18,14 +18,14 @@ def copy_numbers(source, target, count):
 
 @inlined_kernel
 def to_grid_units(params, position):
-    """(x, y, z) in grid units from (x, y, z) in metres, map frame."""
+    """Return (x, y, z) in grid units from (x, y, z) in metres, map frame."""
     low, edge = params.origin_m, params.voxel_size_m
     return (position[0] - low[0]) / edge, (position[1] - low[1]) / edge, (position[2] - low[2]) / edge
 
 
 @inlined_kernel
 def within_grid(params, position):
-    """(x, y, z) in grid units of a place in the workspace, in metres, map frame.
+    """Return (x, y, z) in grid units of a place in the workspace, in metres, map frame.
 
     A place on the workspace's upper faces may be rounded past them, by most where the map's origin is far
     away. It is brought back: rays begin inside, and none has a negative length.
@@ -37,13 +37,13 @@ def within_grid(params, position):
 
 @inlined_kernel
 def grid_size(params):
-    """(X, Y, Z) voxels of the workspace."""
+    """Return (X, Y, Z) voxels of the workspace."""
     return params.size[0], params.size[1], params.size[2]
 
 
 @inlined_kernel
 def path_point(robot, number):
-    """(x, y, z) of a point on a drive: 0 its origin, then its corners, then its goal."""
+    """Return (x, y, z) of a point on a drive: 0 its origin, then its corners, then its goal."""
     if number > robot.corners:
         return point(robot.goal)
     if number > 0:
@@ -53,13 +53,13 @@ def path_point(robot, number):
 
 @inlined_kernel
 def distance_between(a, b):
-    """Distance between two points (x, y, z)."""
+    """Return the distance between two points (x, y, z)."""
     return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
 
 
 @inlined_kernel
 def profile_of(params, robot):
-    """SpeedProfile of a robot's latest drive."""
+    """Return the SpeedProfile of a robot's latest drive."""
     return SpeedProfile(robot.path_m, robot.lead_s, params.max_speed_m_s, params.acceleration_m_s2)
 
 
@@ -73,7 +73,7 @@ def share_left(params, robot, time_s):
 
 @lean_kernel
 def since_scan_m(params, robot, time_s):
-    """Metres that a robot has driven since its latest scan, or since its start."""
+    """Return the metres that a robot has driven since its latest scan, or since its start."""
     if robot.deciding and not robot.under_way:
         return 0.0
     scanned_m = robot.scans_under_way * params.scan_every_m if robot.scans_under_way > 0 else 0.0
@@ -83,7 +83,7 @@ def since_scan_m(params, robot, time_s):
 
 @lean_kernel
 def speed_at(params, robot, time_s):
-    """Speed of a robot on its path, in m/s, at a time as in `pose_at`."""
+    """Return the speed of a robot on its path, in m/s, at a time as in `pose_at`."""
     if time_s >= robot.ready_s - params.scan_time_s:
         return 0.0
     return speed_after(time_s - robot.depart_s, profile_of(params, robot))

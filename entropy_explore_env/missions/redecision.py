@@ -99,7 +99,7 @@ def keeps_target(params, choice, target):
 
 @lean_kernel
 def braking_metres(params, robot, time_s):
-    """Metres on which a robot that drives can come to rest, v²/2a; 0 = it stands."""
+    """Return the metres on which a robot that drives can come to rest, v²/2a; 0 = it stands."""
     speed = speed_at(params, robot, time_s)
     braking_m = 0.5 * speed * speed / params.acceleration_m_s2
     return braking_m if braking_m > _STANDS_M else 0.0
@@ -136,7 +136,7 @@ def note_braking(params, robot, estimate, time_s, choice, braking):
 
 @lean_kernel
 def keeps_speed(choice, rest, braking_m):
-    """Whether a robot's new path, up to its braking distance, leads about where it is driving already.
+    """Return whether a robot's new path, up to its braking distance, leads about where it is driving already.
 
     Args:
         choice: CHOICE, with its new path from `pose`.

@@ -52,7 +52,7 @@ DRAWN = ResetOptions()
 def named_options(
     options: object, allowed: Collection[str] = NAMES, ignored: Mapping[str, object] = MappingProxyType({})
 ) -> dict[str, Any]:
-    """Options of a reset, by name.
+    """Return the options of a reset, by name.
 
     Args:
         options: As given to `reset`.

@@ -254,7 +254,7 @@ def overview_shape(scenario: Scenario) -> tuple[int, int, int] | None:
 
 
 def gaze_set(yaws: int, pitches: int) -> np.ndarray:
-    """(yaws·pitches, 2) float64: yaw from 0 counter-clockwise, pitch from -π/4 (up) to π/4 (down)."""
+    """Return (yaws·pitches, 2) float64: yaw from 0 counter-clockwise, pitch from -π/4 (up) to π/4 (down)."""
     yaw = np.arange(yaws) * (2.0 * math.pi / yaws)
     yaw = np.where(yaw > math.pi, yaw - 2.0 * math.pi, yaw)
     pitch = np.linspace(-math.pi / 4, math.pi / 4, pitches) if pitches > 1 else np.zeros(1)
@@ -262,7 +262,7 @@ def gaze_set(yaws: int, pitches: int) -> np.ndarray:
 
 
 def discrete_moves(scenario: Scenario) -> np.ndarray:
-    """(K, 3) int64 voxel offsets within reach, the nearest first; the first is to stay.
+    """Return (K, 3) int64 voxel offsets within reach, the nearest first; the first is to stay.
 
     The reach is the longest one of the team; a team of planar robots has none that change height. Where the
     scenario asks for moves along the axes, the farthest one each way. (1, 3) zeros where actions are not
@@ -283,7 +283,7 @@ def discrete_moves(scenario: Scenario) -> np.ndarray:
 
 
 def _along_axes(farthest: list[int]) -> np.ndarray:
-    """(K, 3) offsets: to stay, and so far along each axis, both ways; in lexicographic order."""
+    """Return (K, 3) offsets: to stay, and so far along each axis, both ways; in lexicographic order."""
     offsets = np.zeros((7, 3), np.int64)
     for axis, most in enumerate(farthest):
         offsets[1 + 2 * axis : 3 + 2 * axis, axis] = -most, most
@@ -291,13 +291,13 @@ def _along_axes(farthest: list[int]) -> np.ndarray:
 
 
 def _within_box(farthest: list[int]) -> np.ndarray:
-    """(K, 3) offsets up to so far along each axis, in lexicographic order."""
+    """Return (K, 3) offsets up to so far along each axis, in lexicographic order."""
     steps = [np.arange(-most, most + 1) for most in farthest]
     return np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def panorama_directions(scenario: Scenario) -> np.ndarray:
-    """(D, 3) float64 unit vectors of the panorama's rays, map frame; (0, 3) without it."""
+    """Return (D, 3) float64 unit vectors of the panorama's rays, map frame; (0, 3) without it."""
     settings: Observation = scenario.observation
     if not settings.panorama:
         return np.zeros((0, 3))

@@ -67,7 +67,7 @@ def driven_m(robots):
 
 @lean_kernel
 def holds_enough(clock, visible, truth, precision, prior_precision):
-    """Whether a robot's own map holds as much of what can be seen as ends the mission.
+    """Return whether a robot's own map holds as much of what can be seen as ends the mission.
 
     It counts all voxels of more than the prior precision: for missions whose joint map holds enough already.
     """

@@ -344,7 +344,7 @@ class Missions:
         return self.observations
 
     def _chosen_viewpoints(self, numbers: np.ndarray) -> np.ndarray:
-        """(E, A, 5) the viewpoints of the candidates with these numbers (E, A)."""
+        """Return the viewpoints (E, A, 5) of the candidates with these numbers (E, A)."""
         candidates = self.state.candidates["viewpoint"]
         if ((numbers < 0) | (numbers >= candidates.shape[2])).any():
             raise ActionError("actions", numbers, f"whole numbers from 0 to {candidates.shape[2] - 1}")
@@ -352,14 +352,14 @@ class Missions:
         return np.ascontiguousarray(chosen)
 
     def action_masks(self) -> np.ndarray:
-        """(E, A, N) int8: 1 for each action by number that makes sense by the robot's own belief.
+        """Return (E, A, N) int8: 1 for each action by number that makes sense by the robot's own belief.
 
         Of candidates: for each that there is; for robots that do not decide, for the first one.
         """
         return self._compiled_step.action_masks(self.state)
 
     def over(self, mission: int) -> MissionEnd:
-        """Why the mission is over, or MissionEnd.RUNNING."""
+        """Return why the mission is over, or MissionEnd.RUNNING."""
         return _ENDS[self.state.missions["end"][self._checked(mission)]]
 
     def close(self) -> None:

@@ -56,7 +56,7 @@ def start_poses(scenario: Scenario, world: World, rng: np.random.Generator) -> n
 
 
 def _distances_apart_m(scenario: Scenario, robot: int) -> np.ndarray:
-    """(robot,) least distances between the centre of a robot and those of the robots before it."""
+    """Return the (robot,) least distances between the centre of a robot and those of the robots before it."""
     radii_m = np.array([scenario.kind_of(mate).robot.body_radius_m for mate in range(robot + 1)])
     return radii_m[robot] + radii_m[:robot] + _APART * scenario.grid.voxel_size_m
 

@@ -114,7 +114,7 @@ def step_missions(rules, state, choices, work, continuous, discrete, first, last
 
 @lean_kernel
 def air_of(crossing, truth):
-    """Air of a mission; None where the channel reaches by distance alone."""
+    """Return the Air of a mission; None where the channel reaches by distance alone."""
     if crossing is None:  # known while compiling: nothing of the rest is compiled
         return None
     return Air(truth, crossing)

@@ -165,7 +165,7 @@ def view_of(missions: Missions, mission: int, robot: int) -> RobotView:
 
 
 def _landmarks(missions: Missions, mission: int, robot: int) -> np.ndarray:
-    """(N,) LANDMARK of a robot's own map, as it knows them; none where it knows where it is."""
+    """Return the (N,) LANDMARK of a robot's own map, as it knows them; none where it knows where it is."""
     if not missions.state.landmarks.size:
         return np.zeros(0, LANDMARK)
     landmarks = missions.state.landmarks[mission, robot]
@@ -184,7 +184,7 @@ def _candidates(missions: Missions, mission: int, robot: int) -> np.ndarray:
 
 
 def _path_ahead(params: np.void, own: np.void, estimate: np.void | None, time_s: float) -> np.ndarray:
-    """(N, 3) where a robot means to drive, whatever will stop it."""
+    """Return (N, 3) where a robot means to drive, whatever will stop it."""
     if own["deciding"] and not own["under_way"]:
         return np.zeros((0, 3))
     if own["waypoints"] == 0:

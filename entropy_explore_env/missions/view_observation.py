@@ -105,7 +105,7 @@ class ViewObserver:
                 out[part.start : part.stop] = values.reshape(-1)
 
     def viewpoint(self, view: RobotView, action: np.ndarray | int) -> np.ndarray:
-        """Where an action of the policy sends a robot.
+        """Return where an action of the policy sends a robot.
 
         Args:
             action: A number, or (N,), as the policy's action says.

@@ -48,7 +48,7 @@ class Workspace(NamedTuple):
 
 
 def new_workspace(scenario: Scenario, navigators: Mapping[int, Navigator]) -> Workspace:
-    """Scratch memory for steps of a scenario, with the navigators of its kinds of robots that plan."""
+    """Return scratch memory for steps of a scenario, with the navigators of its kinds of robots that plan."""
     kinds, grid = scenario.kinds, scenario.grid
     sensors, robots = [kind.sensor for kind in kinds], [kind.robot for kind in kinds]
     longest_m = max(math.inf if robot.navigator == "planned" else robot.reach_m for robot in robots)
@@ -71,7 +71,7 @@ def new_workspace(scenario: Scenario, navigators: Mapping[int, Navigator]) -> Wo
 
 
 def _new_air(scenario: Scenario) -> Crossing | None:
-    """Scratch memory for lines between robots, if the channel needs them."""
+    """Return scratch memory for lines between robots, if the channel needs them."""
     if scenario.channel.reach == "distance":
         return None
     longest = longest_crossing(*scenario.grid.shape, math.inf, 1)

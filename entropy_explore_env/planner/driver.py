@@ -203,7 +203,7 @@ class Driver(ABC):
         return trail.random.copy()
 
     def _in_vain(self, view: RobotKnowledge, trail: Trail, viewpoint: np.ndarray) -> bool:
-        """Whether a scan at a viewpoint would only repeat the latest one, which brought nothing."""
+        """Return whether a scan at a viewpoint would only repeat the latest one, which brought nothing."""
         came_bits = float(view.scan.utility_bits.sum())
         trail.most_bits = max(trail.most_bits, came_bits)
         stands = not view.under_way and self._is_near(viewpoint[:3], view.pose[:3], 0.5)

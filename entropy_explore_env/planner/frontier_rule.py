@@ -185,7 +185,7 @@ class FrontierRule(Driver):
         return None
 
     def _holds(self, cells: VoxelFrontiers, target: int) -> bool:
-        """Whether a target is one still."""
+        """Return whether a target is one still."""
         return cells.is_known_free(target) if self.until_reached else cells.is_frontier(target)
 
     def _goal(self, view: RobotKnowledge, memory: _Memory, here: int, target: int) -> Goal:

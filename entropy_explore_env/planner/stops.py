@@ -64,6 +64,6 @@ def straightened(view: RobotKnowledge, paths: KnownPaths, path: np.ndarray, goal
 
 
 def apart_m(view: RobotKnowledge, place: np.ndarray) -> float:
-    """Straight distance from a robot to a place, map frame; of planar robots along the plane."""
+    """Return the straight distance from a robot to a place, map frame; of planar robots along the plane."""
     axes = 2 if view.planar else 3
     return float(np.linalg.norm(place[:axes] - view.pose[:axes]))

@@ -145,13 +145,13 @@ def draw_triangle(draw: ImageDraw.ImageDraw, centre: tuple[float, float], unit: 
 
 
 def _corners(centre: tuple[float, float], radius: float, number: int) -> list[tuple[float, float]]:
-    """Corners of a regular polygon that stands on a corner or, with three of them, on a side."""
+    """Return the corners of a regular polygon that stands on a corner or, with three of them, on a side."""
     angles = 2.0 * np.pi * np.arange(number) / number - np.pi / 2.0
     return [(centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)) for angle in angles]
 
 
 def _around(centre: tuple[float, float], radius: float) -> tuple[float, float, float, float]:
-    """Corners of the square around a circle."""
+    """Return the corners of the square around a circle."""
     x, y = centre
     return x - radius, y - radius, x + radius, y + radius
 

@@ -191,7 +191,7 @@ def information_floor(scenario: Scenario, world: World) -> float:
 
 
 def _most_added(scenario: Scenario, kind: RobotKind, world: World) -> float:
-    """Precision, summed over all voxels, that the best of some scans of a kind of robot adds."""
+    """Return the precision, summed over all voxels, that the best of some scans of a kind of robot adds."""
     rng, grid, sensor = np.random.default_rng(0), world.grid, kind.sensor
     layout, model = world.layout(scenario, kind), sensor_model(sensor)
     scan, rng_state = new_scan(grid, [sensor], sensor.rays), np.zeros(1, np.uint64)

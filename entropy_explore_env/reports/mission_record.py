@@ -206,7 +206,7 @@ def same_end(record: MissionRecord, missions: Missions) -> bool:
 
 
 def world_digest(missions: Missions, mission: int) -> str:
-    """SHA-256 of a mission's true world as its file or recipe gave it: its voxels and ceiling."""
+    """Return the SHA-256 of a mission's true world as its file or recipe gave it: its voxels and ceiling."""
     world = missions.worlds[mission]
     if world is None:
         raise CallOrderError("world_digest before reset: call reset() first")
@@ -271,7 +271,7 @@ def save_record(record: MissionRecord, path: Path | str) -> None:
 
 
 def _checksum(entries: Mapping[str, Any]) -> str:
-    """SHA-256 of all entries but the checksum itself."""
+    """Return the SHA-256 of all entries but the checksum itself."""
     return named_digest({name: np.asarray(entries[name]) for name in sorted(entries) if name != "checksum"})
 
 

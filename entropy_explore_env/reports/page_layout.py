@@ -196,7 +196,7 @@ def _arranged(
 
 
 def _panel_boxes(panel: Box, named: int, lines: int, unit: int) -> tuple[Box, Box, Box]:
-    """Status, legend of this many lines and what is left for the curves within the side panel."""
+    """Return the boxes of status, legend of this many lines, and curves within the side panel."""
     narrow = panel.width < 1.6 * panel.height
     column = panel.width if narrow else _SIDE * unit
     status = Box(panel.left, panel.top, column, lines * LINE_HEIGHT * unit)

@@ -73,7 +73,7 @@ class DrivenPaths:
             self._corners_passed[number] = passed
 
     def to_now(self, missions: Missions) -> list[np.ndarray]:
-        """For each robot (N, 3) float64: the path from its start to its current position."""
+        """Return for each robot the path (N, 3) float64 from its start to its current position."""
         here = poses_now(missions, self._mission)[:, :3]
         return [np.stack([*points, place]) for points, place in zip(self.passed_m, here, strict=True)]
 

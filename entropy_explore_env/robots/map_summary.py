@@ -85,7 +85,7 @@ def summary_bytes(voxels: int) -> int:
 
 
 def new_summary_tree(voxels: int) -> Tree:
-    """Working space for writing and reading summaries of maps of this many voxels."""
+    """Return working space for writing and reading summaries of maps of this many voxels."""
     return new_tree(np.zeros(summary_bytes(voxels), np.uint8), voxels)
 
 

@@ -61,7 +61,7 @@ def lattice_of(scenario: Scenario, robot: Robot) -> Lattice:
 
 
 def new_navigators(scenario: Scenario, search: Search | None = None) -> dict[int, Navigator]:
-    """Memory for the plans of each kind of robot that plans, by its number.
+    """Return memory for the plans of each kind of robot that plans, by its number.
 
     They share all arrays of the map's size, so they may not be used at the same time; nor may a search that
     is lent to them.
@@ -89,7 +89,7 @@ def footprints(navigators: Mapping[int, Navigator], kinds: int) -> np.ndarray:
 
 
 def new_navigator(scenario: Scenario, robot: Robot, search: Search | None = None) -> Navigator:
-    """Memory for the plans of one kind of robot.
+    """Return memory for the plans of one kind of robot.
 
     A robot that keeps a margin may believe to stand nearer to a wall than that, or in a pocket, where no path
     leads out though it can drive. To a near goal it then drives straight; what is truly in the way stops it.

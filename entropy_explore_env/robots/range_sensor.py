@@ -155,7 +155,7 @@ def first_rays(scan, count):
 
 
 def new_scan(grid: Grid, sensors: Sequence[RangeSensor], rays: int) -> Scan:
-    """Working space for up to `rays` rays of any of the sensors."""
+    """Return working space for up to `rays` rays of any of the sensors."""
     longest = max(
         longest_crossing(*grid.shape, sensor.max_range_m / grid.voxel_size_m, sensor.voxels_behind)
         for sensor in sensors
@@ -341,7 +341,7 @@ def ends_unreadable(occupied, crossed, n, behind):
 
 @lean_kernel
 def visibility_parameters(rays, yaw, pitch):
-    """Depth and half-angle of what a scan saw (RochaMI, eq. 4).
+    """Return the depth and half-angle of what a scan saw (RochaMI, eq. 4).
 
     Returns:
         (r̂, α̂, measurements): mean measured distance in metres, largest angle in radians between

@@ -120,7 +120,7 @@ def check_choice(settings: object, name: str) -> None:
 
 @lru_cache(maxsize=64)
 def annotations_of(kind: type) -> dict[str, Any]:
-    """Field name of a dataclass → its annotation, evaluated."""
+    """Return the evaluated annotation of each field of a dataclass, by name."""
     hints = get_type_hints(kind)
     return {field.name: hints[field.name] for field in dataclasses.fields(kind)}
 

@@ -84,7 +84,7 @@ def growth_of_error(covariance, surveyor, drive, lever_m, after):
 
 @inlined_kernel
 def error_of_points(covariance, lever_m):
-    """s(Σ) of `growth_of_error`."""
+    """Return s(Σ) of `growth_of_error`."""
     place = covariance[0, 0] + covariance[1, 1] + covariance[2, 2]
     return math.sqrt(max(place + lever_m * lever_m * covariance[3, 3], 0.0))
 
@@ -149,7 +149,7 @@ def move_and_sight(covariance, surveyor, drive, event, here, metres, turned):
 
 @lean_kernel
 def should_be_in_sight(surveyor, viewpoint, here, away):
-    """Whether a scan should sight a landmark; what is unknown hides nothing.
+    """Return whether a scan should sight a landmark; what is unknown hides nothing.
 
     It is taken `here` (x, y, z) with the gaze of a viewpoint (5,), and the landmark lies `away` (x, y, z)
     from it.

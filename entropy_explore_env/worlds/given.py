@@ -70,7 +70,7 @@ def in_given_worlds(scenario: Scenario, given: Sequence[World]) -> Scenario:
 
 
 def checked_worlds(given: object) -> tuple[World, ...]:
-    """One or more Worlds, all of one grid.
+    """Return one or more Worlds, all of one grid.
 
     Raises:
         SettingError: It is something else.
@@ -151,7 +151,7 @@ def _named(world: World, name: str) -> World:
 
 
 def on_one_grid(worlds: Sequence[World]) -> list[World]:
-    """Worlds of different sizes on a grid that holds each: what a smaller one lacks is solid.
+    """Return worlds of different sizes on a grid that holds each: what a smaller one lacks is solid.
 
     All begin at the first one's origin; the frames of their own files are given up. Where one of them has a
     ceiling, all have one: columns that had none are free of it.
@@ -208,7 +208,7 @@ def distinct_paths(paths: Sequence[Path]) -> list[str]:
 
 
 def _tail(path: Path, others: Sequence[Path]) -> str | None:
-    """As much of a path's end as no other path ends with; None = another path is the same."""
+    """Return as much of a path's end as no other path ends with; None = another path is the same."""
     for length in range(1, len(path.parts)):
         tail = path.parts[-length:]
         if all(other.parts[-length:] != tail for other in others):

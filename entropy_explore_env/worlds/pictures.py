@@ -119,7 +119,7 @@ def picture(world: World, starts: np.ndarray | None = None) -> bytes:
 
 
 def _seen(world: World) -> np.ndarray:
-    """(X, Y, Z) bool, what holds something to be seen: free space, what is around it, known walls."""
+    """Return (X, Y, Z) bool, what holds something to be seen: free space, what is around it, known walls."""
     seen = np.asarray(ndimage.binary_dilation(~world.occupied, np.ones((3, 3, 3))), np.bool_)
     return seen if world.unknown is None else seen | (world.occupied & ~world.unknown)
 
@@ -207,12 +207,12 @@ def _stretch(grid: Grid) -> int:
 
 
 def _upright(pixels: np.ndarray) -> np.ndarray:
-    """(rows, columns, 3) of (X, Y, 3): x to the right, y up."""
+    """Return (rows, columns, 3) of (X, Y, 3): x to the right, y up."""
     return np.ascontiguousarray(pixels.swapaxes(0, 1)[::-1])
 
 
 def _coloured(shares: np.ndarray, colours: tuple[tuple[int, int, int], ...]) -> np.ndarray:
-    """(X, Y, 3) uint8: shares in [0, 1], interpolated between equally spaced colours."""
+    """Return (X, Y, 3) uint8: shares in [0, 1], interpolated between equally spaced colours."""
     at = np.linspace(0.0, 1.0, len(colours))
     table = np.asarray(colours, np.float64)
     return np.stack([np.interp(shares, at, table[:, c]) for c in range(3)], axis=-1).astype(np.uint8)

@@ -59,7 +59,7 @@ def driven_up_to(world: World, scenario: Scenario, poses: np.ndarray) -> np.ndar
 
 
 def _starts_of_kinds(world: World, scenario: Scenario, poses: np.ndarray) -> list[tuple[RobotKind, _Starts]]:
-    """Each kind of robot of the team, with the voxels where its robots start."""
+    """Return each kind of robot of the team, with the voxels where its robots start."""
     voxels = np.floor((poses[:, :3] - world.grid.origin_m) / world.grid.voxel_size_m).astype(np.int64)
     voxels = np.clip(voxels, 0, np.array(world.grid.shape) - 1)
     kinds = scenario.kinds
@@ -71,7 +71,7 @@ def _starts_of_kinds(world: World, scenario: Scenario, poses: np.ndarray) -> lis
 
 @lru_cache(maxsize=8)
 def _reached_by(world: World, scenario: Scenario, kind: RobotKind, starts: _Starts) -> np.ndarray:
-    """(X, Y, Z) bool, where robots of a kind can be that start in some voxels; not to be changed."""
+    """Return (X, Y, Z) bool, where robots of a kind can be that start in some voxels; not to be changed."""
     fits = world.layout(scenario, kind).collision_mask == Collision.NONE
     layer = scenario.layer_of(kind.robot)
     if layer is not None:
@@ -83,7 +83,7 @@ def _reached_by(world: World, scenario: Scenario, kind: RobotKind, starts: _Star
 
 @lru_cache(maxsize=8)
 def _visible_to(world: World, scenario: Scenario, kind: RobotKind, starts: _Starts) -> np.ndarray:
-    """(X, Y, Z) bool, what robots of a kind can see that start in some voxels; not to be changed."""
+    """Return (X, Y, Z) bool, what robots of a kind can see that start in some voxels; not to be changed."""
     layout, reached = world.layout(scenario, kind), _reached_by(world, scenario, kind, starts)
     free = np.logical_not(world.occupied)
     seen = layout.visible & free

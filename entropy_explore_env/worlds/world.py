@@ -120,7 +120,7 @@ class World:
         return f"World({self.name!r}, {x} × {y} × {z} voxels of {self.grid.voxel_size_m:g} m)"
 
     def collision_mask(self, body_radius_m: float, ground_layer: int | None = None) -> np.ndarray:
-        """Where the centre of a spherical body cannot be, judged at voxel centres.
+        """Return where the centre of a spherical body cannot be, judged at voxel centres.
 
         Args:
             body_radius_m: Radius of the body in metres; up to half a voxel, the body fits wherever its
@@ -148,7 +148,7 @@ class World:
         return mask
 
     def no_fly_mask(self, body_radius_m: float) -> np.ndarray:
-        """(X, Y, Z) bool, where a spherical body would reach above the ceiling, solid voxels or not.
+        """Return (X, Y, Z) bool, where a spherical body would reach above the ceiling, solid voxels or not.
 
         Raises:
             WorldError: The radius is no finite number ≥ 0.
@@ -169,7 +169,7 @@ class World:
         return {}
 
     def layout(self, scenario: Scenario, kind: RobotKind | None = None) -> Layout:
-        """Where robots of a scenario can start and drive, and what they can observe; computed once.
+        """Return where robots of a scenario can start and drive, and what they can observe; computed once.
 
         Args:
             scenario: The task.
@@ -195,13 +195,13 @@ class World:
         return self._layouts[key]
 
     def visible(self, scenario: Scenario) -> np.ndarray:
-        """(X, Y, Z) bool, which voxels some robot of the team can observe at all."""
+        """Return (X, Y, Z) bool, which voxels some robot of the team can observe at all."""
         check_instance("scenario", scenario, Scenario)
         first, *more = (self.layout(scenario, kind).visible for kind in scenario.kinds)
         return np.logical_or.reduce([first, *more]) if more else first
 
     def visible_voxels(self, scenario: Scenario) -> int:
-        """How many voxels some robot of the team can observe at all."""
+        """Return how many voxels some robot of the team can observe at all."""
         check_instance("scenario", scenario, Scenario)
         if len(scenario.kinds) == 1:
             return self.layout(scenario).visible_voxels
@@ -241,7 +241,7 @@ class World:
         return Layout(collision_mask, np.flatnonzero(starts), visible)
 
     def _within_view(self, positions: np.ndarray, view: _PlaneView) -> np.ndarray:
-        """Which voxels a sensor in a plane can have in its field of view, occlusions disregarded.
+        """Return which voxels a sensor in a plane can have in its field of view, occlusions disregarded.
 
         A voxel that is dz above or below the sensor is in view from |dz|/tan φ away, φ the steepest ray. It
         is visible if some position is at least so far away, and some position within range. The positions
@@ -294,7 +294,7 @@ class _PlaneView(NamedTuple):
 
 
 def _spans_plane(points: np.ndarray) -> bool:
-    """Whether (N, 2) points do not lie on one line."""
+    """Return whether (N, 2) points do not lie on one line."""
     return len(points) > 2 and int(np.linalg.matrix_rank(points - points[0])) == 2
 
 
@@ -343,7 +343,7 @@ def part_of(world: World, box: tuple[slice, ...]) -> World:
 
 
 def no_fly_mask(ceiling: np.ndarray, layers: int, body_radius: float) -> np.ndarray:
-    """Where a spherical body in a voxel's centre would reach above a ceiling.
+    """Return where a spherical body in a voxel's centre would reach above a ceiling.
 
     Args:
         ceiling: (X, Y) int32, in each column the lowest layer of the no-fly zone.

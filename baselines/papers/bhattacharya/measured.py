@@ -71,7 +71,7 @@ def split(name: str, eta: float | None) -> Split:
 
 
 def ratios() -> dict[str, Any]:
-    """Ratio by region, of plain cells and for each η."""
+    """Return the ratio by region, of plain cells and for each η."""
     return {
         name: {"plain": split(name, None).ratio, **{f"{eta:g}": split(name, eta).ratio for eta in ETAS}}
         for name in REGIONS

@@ -125,7 +125,7 @@ def start_cells(occupied: np.ndarray, starts: str, robots: int, seed: int) -> li
 
 
 def _snapshot(simulation: Simulation) -> dict[str, np.ndarray]:
-    """Robot 0's map and cells, in bytes."""
+    """Return robot 0's map and cells, in bytes."""
     planner = simulation.planners[0]
     return {
         "entropy": np.round(255.0 * planner.belief.entropy[:, :, 0] / math.log(2.0)).astype(np.uint8),

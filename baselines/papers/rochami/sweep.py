@@ -102,7 +102,7 @@ def _cell(
 
 
 def _sharing_cells(starts: int, quick: bool) -> list[Cell]:
-    """Rocha04's room with its gradient strategy: I_min fixed, or steered."""
+    """Return the cells of Rocha04's room with its gradient strategy: I_min fixed, or steered."""
     cells = []
     for robots in SHARING_TEAMS[:1] if quick else SHARING_TEAMS:
         base = with_settings(ROOM, {"robots": robots, "channel": {"burst": 64}, "time_limit_s": math.inf})

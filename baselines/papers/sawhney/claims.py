@@ -62,13 +62,13 @@ _HALVES = (slice(0, None, 2), slice(1, None, 2))
 
 
 def worlds_in(records: Records, part: str) -> tuple[str, ...]:
-    """Worlds of a part that were run."""
+    """Return the worlds of a part that were run."""
     worlds = PLANS if part == "plans" else (*TERRAINS, DEM)
     return tuple(w for w in worlds if any(cell_id(w, n, "ptv") in records for n in TEAMS))
 
 
 def teams_in(records: Records, part: str) -> tuple[int, ...]:
-    """Team sizes of a part that were run."""
+    """Return the team sizes of a part that were run."""
     worlds = worlds_in(records, part)
     return tuple(n for n in TEAMS if worlds and cell_id(worlds[0], n, "ptv") in records)
 

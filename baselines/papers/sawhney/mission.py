@@ -100,7 +100,7 @@ def explore_until_done(
 
 
 def _reached(times_s: Sequence[float], shares: Sequence[float], mark: float, limit_s: float) -> float:
-    """First time with this share."""
+    """Return the first time with this share."""
     there = np.flatnonzero(np.asarray(shares) >= mark)
     return round(float(times_s[there[0]]), 3) if len(there) else limit_s
 

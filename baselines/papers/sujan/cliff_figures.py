@@ -158,7 +158,7 @@ def figure_completion(records: Records) -> Figure:
 
 
 def edge_of_world(number: int) -> tuple[np.ndarray, Edge]:
-    """Heights (X, Y) in voxel edges of a world of `cliff`, and the edge of its plateau."""
+    """Return heights (X, Y) in voxel edges of a world of `cliff`, and the edge of its plateau."""
     heights = make_world(CLIFF, number).occupied.sum(axis=2).astype(np.float64)
     wheel = WHEEL_M / CLIFF.grid.voxel_size_m
     return heights, find_edge(heights, (16, 48), wheel, wheel, wheel)

@@ -69,7 +69,7 @@ def clear_queue(queue):
 
 @inlined_kernel
 def queue_full(queue):
-    """Whether only the spare block is left, which `compact` needs."""
+    """Return whether only the spare block is left, which `compact` needs."""
     state = queue.state[0]
     return state.free == _NO_BLOCK and state.unused >= len(queue.blocks) - 1
 

@@ -65,7 +65,7 @@ class Tessellation(NamedTuple):
 
 
 def new_tessellation(shape: tuple[int, int, int]) -> Tessellation:
-    """Memory for a grid of (X, Y, Z) voxels."""
+    """Return memory for a grid of (X, Y, Z) voxels."""
     x, y, z = shape
     strides = (y + 2, 1, 0) if z == 1 else ((y + 2) * (z + 2), z + 2, 1)
     voxels = (x + 2) * (y + 2) * (1 if z == 1 else z + 2)
@@ -80,7 +80,7 @@ def new_tessellation(shape: tuple[int, int, int]) -> Tessellation:
 
 
 def _inside(space: Tessellation, padded: np.ndarray) -> np.ndarray:
-    """(X, Y, Z) view of (P,) numbers without their margin."""
+    """Return the (X, Y, Z) view of (P,) numbers without their margin."""
     x, y, z = space.shape
     if z == 1:
         return padded.reshape(x + 2, y + 2, 1)[1:-1, 1:-1]
@@ -267,7 +267,7 @@ def extract_path(
 
 @inlined_kernel
 def _step_possible(traversal_cost, x, y, z, i, j, k):
-    """Whether all voxels in the box between two neighbouring voxels are passable."""
+    """Return whether all voxels in the box between two neighbouring voxels are passable."""
     for a in range(min(x, i), max(x, i) + 1):
         for b in range(min(y, j), max(y, j) + 1):
             for c in range(min(z, k), max(z, k) + 1):

@@ -183,7 +183,7 @@ def belief_costs(
     unknown_cost: float = 1.0,
     no_fly: np.ndarray | None = None,
 ) -> Costs:
-    """Traversal costs of a belief.
+    """Return traversal costs of a belief.
 
     Args:
         mean: (X, Y, Z) or (V,) float32 expected coverage; voxels above ½ are impassable.
@@ -207,7 +207,7 @@ def belief_costs(
 
 
 def costs_of(per_edge: np.ndarray, min_per_edge: float) -> Costs:
-    """Traversal costs of a (V,) float32 field that is known to be valid, and a lower bound of them."""
+    """Return traversal costs of a (V,) float32 field that is known to be valid, and a lower bound of them."""
     none = per_edge[:0]
     return Costs(none, none, 0.0, 1.0, per_edge, min_per_edge, NO_FLY_NOWHERE)
 
@@ -221,13 +221,13 @@ def _flat(field: np.ndarray) -> np.ndarray:
 
 @inlined_kernel
 def in_no_fly(costs, voxel):
-    """Whether a voxel lies in the no-fly mask."""
+    """Return whether a voxel lies in the no-fly mask."""
     return len(costs.no_fly) > 0 and costs.no_fly[voxel]
 
 
 @inlined_kernel
 def classify_voxel(lattice, costs, voxel, x, y, z, first, last):
-    """Class of a voxel: IMPASSABLE, FREE or UNKNOWN.
+    """Return the class of a voxel: IMPASSABLE, FREE or UNKNOWN.
 
     Args:
         x: Its index along x.

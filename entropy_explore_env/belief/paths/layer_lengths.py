@@ -43,7 +43,7 @@ _QUEUED = 256
 
 
 def _leads_on(step: int, free: int) -> int:
-    """Bits of the steps by which canonical paths go on from a voxel that a step reached.
+    """Return the bits of the steps by which canonical paths go on from a voxel that a step reached.
 
     Args:
         step: Its number.
@@ -61,7 +61,7 @@ def _leads_on(step: int, free: int) -> int:
 
 
 def _possible(free: int) -> int:
-    """Bits of the steps that are possible: a diagonal one where both along its axes are, too."""
+    """Return the bits of the steps that are possible: a diagonal one where both along its axes are, too."""
     possible = free & ((1 << _STRAIGHT) - 1)
     for x, y in _STEPS[_STRAIGHT:]:
         needs = _bits((x, y), (x, 0), (0, y))
@@ -70,7 +70,7 @@ def _possible(free: int) -> int:
 
 
 def _bits(*steps: tuple[int, int]) -> int:
-    """Bits of steps, by their numbers."""
+    """Return the bits of steps, by their numbers."""
     return sum(1 << _STEPS.index(step) for step in steps)
 
 
@@ -83,7 +83,7 @@ _ONWARD = np.array(
 
 @inlined_kernel
 def _free_neighbours(lattice, per_edge, voxel):
-    """Bits of the passable neighbours of a voxel, by the number of the step to them."""
+    """Return the bits of the passable neighbours of a voxel, by the number of the step to them."""
     size, moves, free = lattice.size, lattice.moves, 0
     x, y, _ = grid_index(size, voxel)
     if 0 < x < size[0] - 1 and 0 < y < size[1] - 1:
@@ -152,7 +152,7 @@ def fill_layer_lengths(search, lattice, costs, source, targets, lengths):
 
 @inlined_kernel
 def _length(search, voxel):
-    """Length of the shortest path to a voxel that is known so far; inf = none."""
+    """Return the length of the shortest path to a voxel that is known so far; inf = none."""
     reached = np.int64(search.mark[voxel]) >> SEARCH_SHIFT == search.searches[0]
     return search.cost[voxel] if reached else math.inf
 

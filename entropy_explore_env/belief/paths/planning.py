@@ -70,7 +70,7 @@ class _Query(NamedTuple):
 
 @inlined_kernel
 def _octile_distance(a, b):
-    """Length of the shortest path by steps from indices (x, y, z) to others without obstacles."""
+    """Return the length of the shortest path by steps from indices (x, y, z) to others without obstacles."""
     x, y, z = abs(b[0] - a[0]), abs(b[1] - a[1]), abs(b[2] - a[2])
     longest, shortest = max(x, y, z), min(x, y, z)
     middle = x + y + z - longest - shortest

@@ -48,7 +48,7 @@ class Search(NamedTuple):
 
 
 def new_search(voxels: int) -> Search:
-    """Memory for searches in worlds of this many voxels."""
+    """Return memory for searches in worlds of this many voxels."""
     return Search(
         np.empty(voxels, np.float64),
         np.zeros(voxels, np.uint32),
@@ -85,13 +85,13 @@ def mark_of(search, lattice, costs, voxel, x, y, z):
 
 @inlined_kernel
 def is_passable(mark):
-    """Whether the voxel of a mark can be entered."""
+    """Return whether the voxel of a mark can be entered."""
     return mark & KIND != IMPASSABLE
 
 
 @inlined_kernel
 def cost_per_edge(costs, voxel, mark):
-    """Traversal cost of a voxel, given its mark; that of an impassable start is the lower bound."""
+    """Return the traversal cost of a voxel by its mark; that of an impassable start is the lower bound."""
     kind = mark & KIND
     if kind == IMPASSABLE:
         return costs.min_per_edge
@@ -102,7 +102,7 @@ def cost_per_edge(costs, voxel, mark):
 
 @inlined_kernel
 def cost_to(search, voxel):
-    """Cost of reaching a voxel in the latest search; inf = not reached."""
+    """Return the cost of reaching a voxel in the latest search; inf = not reached."""
     mark = np.int64(search.mark[voxel])
     reached = mark >> SEARCH_SHIFT == search.searches[0] and mark & STEP != 0
     return search.cost[voxel] if reached else math.inf

@@ -44,7 +44,7 @@ class Path(NamedTuple):
 
 @inlined_kernel
 def _axis(position, finish, size):
-    """(voxel index, step) of a straight line along one axis."""
+    """Return (voxel index, step) of a straight line along one axis."""
     index = min(max(int(position), 0), size - 1)
     return index, (1 if finish > position else (-1 if finish < position else 0))
 
@@ -59,7 +59,7 @@ def _share(index, step, position, finish):
 
 @inlined_kernel
 def _at_edge(share, nearest, extent, shortest):
-    """Whether the face at a share of the line is crossed together with the nearest one, at their edge.
+    """Return whether the face at a share of the line is crossed together with the nearest one, at their edge.
 
     Or so near to the edge that the line, moved sideways by `_EDGE_TOLERANCE`, would cross the faces in the
     other order.
@@ -69,7 +69,7 @@ def _at_edge(share, nearest, extent, shortest):
 
 @lean_kernel
 def line_of_sight_cost(search, lattice, costs, start, finish):
-    """Cost of a straight drive from one point to another; inf if it is not free.
+    """Return the cost of a straight drive from one point to another; inf if it is not free.
 
     The body has to fit in every voxel that the line crosses, with its centre at the voxel's centre, and in
     all voxels at an edge or corner that the line crosses or nearly touches. The first voxel may be
@@ -144,7 +144,7 @@ def _distance(a, b):
 
 @inlined_kernel
 def _cost_along(search, lattice, costs, path, number):
-    """Cost of the path from the start to a stop."""
+    """Return the cost of the path from the start to a stop."""
     if number == 0:
         return 0.0
     voxels, start, finish = path.voxels, path.start, path.finish
@@ -208,7 +208,7 @@ def string_pull(search, lattice, costs, path, waypoints):
 def string_pulled(
     search: Search, lattice: Lattice, costs: Costs, voxels: np.ndarray, start: np.ndarray, finish: np.ndarray
 ) -> np.ndarray:
-    """Waypoints in place of a path; see `string_pull`.
+    """Return waypoints in place of a path; see `string_pull`.
 
     Args:
         search: The search that found the path, and none after it.

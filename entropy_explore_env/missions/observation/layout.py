@@ -86,7 +86,7 @@ class ObservationLayout:
         return short_repr(spaces.Dict({name: _part_space(name, part) for name, part in self.parts.items()}))
 
     def flat_space(self, robots: int | None = None) -> spaces.Box:
-        """One robot's observation as a Box, or that of a whole team one after the other."""
+        """Return one robot's observation as a Box, or that of a whole team one after the other."""
         low, high = self.low.astype(np.float32), self.high.astype(np.float32)
         if robots is not None:
             low, high = np.tile(low, robots), np.tile(high, robots)
@@ -121,7 +121,7 @@ def short_repr(space: _Space) -> _Space:
 
 
 def _range_text(bounds: np.ndarray) -> str:
-    """One number where all are alike, else the least and the largest."""
+    """Return one number where all are alike, else the least and the largest."""
     if bounds.size == 0:
         return "-"
     least, most = float(bounds.min()), float(bounds.max())
@@ -174,7 +174,7 @@ def observation_parts(scenario: Scenario) -> dict[str, Part]:
 
 
 def _candidate_parts(scenario: Scenario) -> dict[str, tuple[tuple[int, ...], float, np.ndarray]]:
-    """Shapes and bounds of the parts that describe candidates."""
+    """Return the shapes and bounds of the parts that describe candidates."""
     most, one = scenario.action.candidates, np.ones(1)
     parts: dict[str, tuple[tuple[int, ...], float, np.ndarray]] = {}
     if scenario.observation.candidates:
@@ -193,7 +193,7 @@ def action_count(scenario: Scenario, rules: Rules) -> int:
 
 
 def _most_utility_bits(scenario: Scenario, rules: Rules) -> float:
-    """More than any ray can bring: the longest one, over voxels that were never measured."""
+    """Return a bound of what a ray can bring: the longest one, over voxels that were never measured."""
     most, prior = 0.0, float(rules.params[0]["prior_precision"])
     for kind in scenario.kinds:
         length = kind.sensor.max_range_m / scenario.grid.voxel_size_m

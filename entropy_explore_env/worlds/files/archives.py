@@ -130,14 +130,14 @@ def _world(entries: dict[str, np.ndarray]) -> Voxels:
 
 
 def _bits(packed: np.ndarray, shape: tuple[int, int, int]) -> np.ndarray:
-    """(X, Y, Z) uint8, 0 or 1, of packed bits."""
+    """Return (X, Y, Z) uint8, 0 or 1, of packed bits."""
     if packed.dtype != np.uint8 or packed.shape != (math.ceil(math.prod(shape) / 8),):
         raise RefusedError("a saved world with a bit for each voxel")
     return np.unpackbits(packed, count=math.prod(shape)).reshape(shape)
 
 
 def _fits(ceiling: np.ndarray, shape: tuple[int, int, int]) -> bool:
-    """Whether a ceiling has a valid layer for each column."""
+    """Return whether a ceiling has a valid layer for each column."""
     if ceiling.dtype != np.int32 or ceiling.shape != shape[:2]:
         return False
     return bool(ceiling.min() >= 0 and ceiling.max() <= shape[2])

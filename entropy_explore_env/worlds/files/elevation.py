@@ -100,13 +100,13 @@ def columns(
 
 
 def _layers_below(height_m: np.ndarray, floor_m: float, voxel_m: float, most: int) -> np.ndarray:
-    """(X, Y) int32 number of layers whose centres lie below a surface (X, Y); all where it is NaN."""
+    """Return how many layers, (X, Y) int32, have centres below a surface (X, Y); all where it is NaN."""
     layers = np.ceil((height_m - floor_m) / voxel_m - 0.5 - 1e-9)
     return np.clip(np.where(np.isnan(layers), most, layers), 1, most).astype(np.int32)
 
 
 def _highest(samples: np.ndarray, rows: int, width: float) -> np.ndarray:
-    """(rows, …) the highest of the samples (N, …) that each row, `width` samples wide, overlaps."""
+    """Return (rows, …) the highest of the samples (N, …) that each row, `width` samples wide, overlaps."""
     last = len(samples)
     found = np.empty((rows, *samples.shape[1:]))
     for row in range(rows):

@@ -95,7 +95,7 @@ def read(path: Path, options: Options) -> Voxels:
 
 
 def _heights_m(raw: np.ndarray, tags: Mapping[int, Any], keys: Mapping[str, Any]) -> np.ndarray:
-    """(rows, columns) float64 of the raster's samples, NaN where there is none."""
+    """Return (rows, columns) float64 of the raster's samples, NaN where there is none."""
     rows = raw.astype(np.float64)
     stated = str(tags.get(_GDAL_NODATA, "")).strip("\0 \t\r\n")
     if stated:
@@ -127,7 +127,7 @@ def _gdal_items(text: Any) -> dict[str, str]:  # noqa: ANN401 - whatever the tag
 
 
 def _place(tags: Mapping[int, Any]) -> _Place | None:
-    """Where the raster lies; None where it has no tags that say so."""
+    """Return where the raster lies; None where it has no tags that say so."""
     scale, tie, matrix = (tags.get(code) for code in (_PIXEL_SCALE, _TIE_POINTS, _TRANSFORMATION))
     if scale is not None:
         step_x, step_y = float(scale[0]), float(scale[1])

@@ -166,7 +166,7 @@ def _number(about: dict[str, Any], name: str, accepts: Callable[[float], bool]) 
 
 
 def _truth(text: Any) -> bool:  # noqa: ANN401 - texts, lists and mappings
-    """Whether `negate` says yes, in words or as a number."""
+    """Return whether `negate` says yes, in words or as a number."""
     word = text.strip().lower() if isinstance(text, str) else ""
     if word in _YES or word in _NO:
         return word in _YES

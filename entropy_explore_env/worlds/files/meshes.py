@@ -125,7 +125,7 @@ def _moved_inwards(corners: np.ndarray, sign: float) -> np.ndarray:
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
-    """(…, 3) vectors of length 1, or 0 where a vector is 0."""
+    """Return (…, 3) vectors of length 1, or 0 where a vector is 0."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300)
 
 
@@ -166,7 +166,7 @@ def _mark(solid: np.ndarray, low: np.ndarray, places: np.ndarray) -> None:
 
 
 def _corners_of_parts(halvings: int) -> np.ndarray:
-    """(P, 3) shares of its corners in those of the triangles that one is cut into, four each time."""
+    """Return (P, 3) shares of its corners in those of the triangles that one is cut into, four each time."""
     parts = 1 << halvings
     b, c = np.nonzero(np.add.outer(np.arange(parts + 1), np.arange(parts + 1)) <= parts)
     return np.stack((parts - b - c, b, c), axis=1) / parts
@@ -179,7 +179,7 @@ def _places_on(halvings: int) -> np.ndarray:
 
 
 def _are_thin(corners: np.ndarray) -> np.ndarray:
-    """(M,) which of the triangles (M, 3, 3) are long and thin.
+    """Return (M,) which of the triangles (M, 3, 3) are long and thin.
 
     Cut into four at the middles of its edges, a triangle keeps its form: a needle of a thousand small
     triangles in a row would become a million.
@@ -189,7 +189,7 @@ def _are_thin(corners: np.ndarray) -> np.ndarray:
 
 
 def _lines(corners: np.ndarray) -> np.ndarray:
-    """Lines (N, 2, 3) side by side that cover long thin triangles (M, 3, 3), in voxels.
+    """Return lines (N, 2, 3) side by side that cover long thin triangles (M, 3, 3), in voxels.
 
     They go from both ends of a triangle's longest side to places on its height above that side.
     """
@@ -207,7 +207,7 @@ def _lines(corners: np.ndarray) -> np.ndarray:
 
 
 def _divided(corners: np.ndarray) -> np.ndarray:
-    """Triangles (M, 3, 3), the largest ones cut into four at the middles of their edges."""
+    """Return triangles (M, 3, 3), the largest ones cut into four at the middles of their edges."""
     done = [corners[:0]]
     while len(corners):
         large = _halvings(corners) > _HALVINGS_AT_ONCE
@@ -220,12 +220,12 @@ def _divided(corners: np.ndarray) -> np.ndarray:
 
 
 def _longest_sides(corners: np.ndarray) -> np.ndarray:
-    """(M,) the longest side of each of the triangles (M, 3, 3), or the length of lines (M, 2, 3)."""
+    """Return (M,) the longest side of each of the triangles (M, 3, 3), or the length of lines (M, 2, 3)."""
     return np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1, initial=0.0)
 
 
 def _halvings(corners: np.ndarray) -> np.ndarray:
-    """(M,) how often triangles (M, 3, 3) or lines, in voxels, are cut until no edge is too long."""
+    """Return (M,) how often triangles (M, 3, 3) or lines, in voxels, are cut until no edge is too long."""
     return np.ceil(np.log2(np.maximum(_SHARE * _longest_sides(corners), 1.0))).astype(np.int64)
 
 

@@ -162,7 +162,7 @@ _STATES_OF_MASK = [
 
 
 def own_labels(leaves: Leaves, shape: tuple[int, int, int]) -> np.ndarray:
-    """(X, Y, Z) int8 labels at the tree's own resolution."""
+    """Return (X, Y, Z) int8 labels at the tree's own resolution."""
     labels = np.full(shape, UNKNOWN, np.int8)
     label = np.where(leaves.solid, SOLID, FREE).astype(np.int8)
     single = leaves.width == 1
@@ -174,7 +174,7 @@ def own_labels(leaves: Leaves, shape: tuple[int, int, int]) -> np.ndarray:
 
 
 def _summed_labels(leaves: Leaves, scale: float, shape: tuple[int, int, int]) -> np.ndarray:
-    """(X, Y, Z) int8 labels of voxels `scale` own ones wide, by the volumes of leaves.
+    """Return (X, Y, Z) int8 labels of voxels `scale` own ones wide, by the volumes of leaves.
 
     By the rule of `resampling`.
     """

@@ -91,7 +91,7 @@ def _head(head: bytes, size: int) -> tuple[list[_Field], int]:
 def _coordinates(
     encoding: bytes, body: bytes, fields: list[_Field], points: int, at: list[int]
 ) -> np.ndarray:
-    """Coordinates (N, 3) float64 of points.
+    """Return the coordinates (N, 3) float64 of points.
 
     Args:
         encoding: As the line DATA names it.
@@ -121,7 +121,7 @@ def _coordinates(
 
 
 def upright(places: np.ndarray, options: Options, up: str = "z", unit_m: float = 1.0) -> np.ndarray:
-    """Places (N, 3) in metres with z up, by the options `scale` and `up`, or as the file has them.
+    """Return places (N, 3) in metres with z up, by the options `scale` and `up`, or as the file has them.
 
     Args:
         places: In the file's units and axes.
@@ -152,7 +152,7 @@ def check_extent(extent_m: np.ndarray, voxel_m: float, options: Options) -> tupl
 
 
 def voxels_of(points_m: np.ndarray, options: Options) -> Voxels:
-    """Voxels, on multiples of the voxel size, that points (N, 3) lie in; only finite ones count.
+    """Return voxels, on multiples of the voxel size, that points (N, 3) lie in; only finite ones count.
 
     Points are as the file has them: `scale` and `up` apply.
     """

@@ -210,7 +210,7 @@ class ReaderProcess:
 
 
 def _size(path: Path | str) -> int:
-    """Bytes of a file; 0 for a name.
+    """Return the bytes of a file; 0 for a name.
 
     Raises:
         WorldError: It is missing or too large.
@@ -228,7 +228,7 @@ def _size(path: Path | str) -> int:
 def _ask(
     process: subprocess.Popen[bytes], request: dict[str, Any]
 ) -> tuple[dict[str, Any], list[np.ndarray]] | None:
-    """Header and arrays of the answer; None if the process died."""
+    """Return the header and arrays of the answer; None if the process died."""
     assert process.stdin is not None and process.stdout is not None
     try:
         process.stdin.write(json.dumps(request).encode() + b"\n")

@@ -123,7 +123,7 @@ def memory_allowed(limit_bytes: int) -> str:
 
 
 def content(path: Path) -> bytes:
-    """All bytes of a file.
+    """Return all bytes of a file.
 
     Raises:
         RefusedError: It does not exist or is too large.

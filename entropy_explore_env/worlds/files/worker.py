@@ -46,7 +46,7 @@ def serve() -> None:
 
 
 def _answer(request: dict[str, Any]) -> tuple[dict[str, Any], list[np.ndarray]]:
-    """Header and arrays of the answer to a request."""
+    """Return the header and arrays of the answer to a request."""
     try:
         reader = importlib.import_module(_READERS + request["reader"])
         for module, package in reader.NEEDS:
@@ -118,7 +118,7 @@ def _limit_memory(most_bytes: int) -> None:
 
 
 def _peak_kib() -> float:
-    """Peak memory of this process, NaN where the system does not tell it.
+    """Return the peak memory of this process, NaN where the system does not tell it.
 
     `ru_maxrss` would include that of the process which started it.
     """

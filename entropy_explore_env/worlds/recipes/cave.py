@@ -66,7 +66,7 @@ def _halls(room_m: np.ndarray, narrowest: float, rng: np.random.Generator) -> tu
 
 
 def _tunnel_ends(halls: np.ndarray, rng: np.random.Generator) -> list[tuple[int, int]]:
-    """Pairs of halls with a tunnel between them."""
+    """Return the pairs of halls with a tunnel between them."""
     lengths = np.linalg.norm(halls[:, None] - halls, axis=2)
     tree = minimum_spanning_tree(lengths).tocoo()
     pairs = {(min(i, j), max(i, j)) for i, j in zip(tree.row.tolist(), tree.col.tolist(), strict=True)}

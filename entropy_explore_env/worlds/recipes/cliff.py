@@ -64,7 +64,7 @@ def cliff(grid: Grid, rng: np.random.Generator) -> World:
 
 
 def _edge_line(grid: Grid, rng: np.random.Generator) -> np.ndarray:
-    """(Y,) where along x the plateau ends, in metres, for each row of columns: a polyline."""
+    """Return (Y,) where along x the plateau ends, in metres, for each row of columns: a polyline."""
     length_m, middle_m = float(grid.size_m[1]), _EDGE_AT * float(grid.size_m[0])
     corners = [-rng.uniform(*_TURN_M)]
     while corners[-1] < length_m:

@@ -18,7 +18,7 @@ _MAX_ROUNDS = 20
 
 
 def body_room(occupied: np.ndarray, voxel_size_m: float) -> np.ndarray:
-    """Where a body of `BODY_RADIUS_M` fits.
+    """Return where a body of `BODY_RADIUS_M` fits.
 
     Args:
         occupied: (X, Y, Z) or (X, Y) bool.

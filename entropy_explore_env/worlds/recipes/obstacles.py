@@ -88,7 +88,7 @@ def scatter(
 
 
 def _polygon(longest: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Outward normals (N, 2) and offsets (N,) of the edges: normal · point ≤ offset inside."""
+    """Return outward normals (N, 2) and offsets (N,) of the edges: normal · point ≤ offset inside."""
     corners = int(rng.integers(3, 9))
     angles = (np.arange(corners) + rng.uniform(0.0, 0.7, corners)) * (2.0 * math.pi / corners)
     turn, flat = rng.uniform(0.0, math.pi), rng.uniform(0.5, 1.0)
@@ -116,7 +116,7 @@ def cluttered(grid: Grid, rng: np.random.Generator) -> World:
 def cluttered_plan(
     shape: tuple[int, int], voxel_size_m: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Solid voxels (X, Y) bool, and the number of the obstacle in each voxel, (X, Y) int32."""
+    """Return solid voxels (X, Y) bool, and the number of the obstacle in each voxel, (X, Y) int32."""
     solid = np.zeros(shape, bool)
     numbers = scatter(solid, np.zeros(shape, bool), _CLUTTER_M, _CLUTTERED, voxel_size_m, rng)
     return fill_pockets(solid, voxel_size_m), numbers

@@ -38,7 +38,7 @@ class Rectangle(NamedTuple):
         return slice(self.low[0], self.high[0]), slice(self.low[1], self.high[1])
 
     def extent(self, axis: int) -> int:
-        """Voxels along an axis."""
+        """Return the number of voxels along an axis."""
         return self.high[axis] - self.low[axis]
 
     def within(self, axis: int, low: int, high: int) -> Rectangle:

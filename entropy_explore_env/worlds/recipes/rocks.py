@@ -33,7 +33,7 @@ class RockSizes(NamedTuple):
 
 
 def covered_share(abundance: float, diameter_m: float) -> float:
-    """F_k(D): share of the ground under rocks of at least this diameter."""
+    """Return F_k(D), the share of the ground under rocks of at least this diameter."""
     return abundance * math.exp(-_decay(abundance) * diameter_m)
 
 
@@ -42,7 +42,7 @@ def _decay(abundance: float) -> float:
 
 
 def draw_diameters(sizes: RockSizes, area_m2: float, rng: np.random.Generator) -> np.ndarray:
-    """(N,) diameters in metres of the rocks on some ground, the largest first.
+    """Return (N,) diameters in metres of the rocks on some ground, the largest first.
 
     The number of rocks a square metre and metre of diameter is -F_k'(D)/(πD²/4); N is Poisson.
     """

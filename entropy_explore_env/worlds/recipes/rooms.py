@@ -45,7 +45,7 @@ def furnished(grid: Grid, rng: np.random.Generator) -> World:
 
 
 def _boxes(grid: Grid, rng: np.random.Generator) -> np.ndarray:
-    """Boxes of 0.5-2 m on the floor, 0.5 m to three quarters of the room high."""
+    """Return boxes of 0.5-2 m on the floor, 0.5 m to three quarters of the room high."""
     occupied = np.zeros(grid.shape, bool)
     floor = grid.shape[0] * grid.shape[1]
     while occupied[:, :, 0].sum() < _FURNITURE_SHARE * floor:
