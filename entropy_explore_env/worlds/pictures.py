@@ -29,6 +29,8 @@ _DOTS = 100.0
 _LONG_SIDE, _LEAST_SIDE, _LEAST_WIDTH = 8.8, 0.6, 4.8
 """Of a view, of the height of a side view and of the picture; _AROUND is the room for ticks and titles."""
 _AROUND = 0.75
+_TICK = 0.9
+"""Width of a tick's label with many digits."""
 _LONGEST_NAME = 40
 _ROOFED = 0.5
 """Above this share of columns that are solid at the top, a world counts as roofed."""
@@ -99,6 +101,8 @@ def picture(world: World, starts: np.ndarray | None = None) -> bytes:
         ax.set_aspect(view.stretch)
         ax.set_title(view.title, loc="left", fontsize=9)
         ax.set_xlabel("m", loc="right")
+        ax.ticklabel_format(useOffset=False, style="plain")  # UTM coordinates keep all their digits
+        ax.locator_params(axis="x", nbins=max(1, min(9, int(scale * across / _TICK))), min_n_ticks=1)
     figure.suptitle(title, x=0.02, ha="left", fontsize=11)
     shown = [
         world.unknown is not None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from entropy_explore_env.worlds.pictures import (
 )
 from entropy_explore_env.worlds.world import World
 
-pytest.importorskip("matplotlib")
+Figure = pytest.importorskip("matplotlib.figure").Figure
 
 
 def drawn(occupied, edge=0.5, origin=(10.0, -20.0, 3.0), name="hall", **masks):
@@ -72,6 +73,25 @@ def test_long_names_and_sizes_from_a_millimetre_to_a_hundred_kilometres_fit():
         pixels = drawn(occupied, edge, name="a very long name of a world " * 8)
         assert pixels.shape[1] <= 1008
         assert (pixels[:, -2:] == 255).all()  # nothing runs over the edge
+
+
+@pytest.mark.parametrize("shape", [(40, 400, 1), (400, 40, 1), (12, 9, 5)])
+def test_ticks_in_utm_coordinates_are_whole_and_apart(monkeypatch, shape):
+    drawn_figures = []
+    save = Figure.savefig
+    monkeypatch.setattr(
+        Figure, "savefig", lambda self, *a, **k: (drawn_figures.append(self), save(self, *a, **k))
+    )
+    drawn(np.zeros(shape, bool), 0.1, (431_000.35, 5_411_000.7, 0.0))
+    for ax in drawn_figures[0].axes:
+        low, high = ax.get_xlim()
+        shown = [tick for tick in ax.get_xticklabels() if low <= tick.get_position()[0] <= high]
+        assert shown and all(
+            tick.get_text().startswith("43100" if shape[0] < 100 else "4310") for tick in shown
+        )
+        boxes = [tick.get_window_extent() for tick in shown]
+        assert all(left.x1 < right.x0 for left, right in pairwise(boxes))
+        assert not ax.xaxis.get_offset_text().get_text() and not ax.yaxis.get_offset_text().get_text()
 
 
 def test_lengths_are_not_said_more_exactly_than_anybody_reads():
