@@ -45,9 +45,19 @@ def _passed_on(value: object) -> object:
 
 
 def did_you_mean(word: object, known: Iterable[str]) -> str:
-    """Return the known name most like a word, as the end of a message; empty where none is like it."""
-    alike = difflib.get_close_matches(word, list(known), n=1) if isinstance(word, str) else []
-    return f"; did you mean {alike[0]}?" if alike else ""
+    """Return the known name most like a word, as the end of a message; empty where none is like it.
+
+    Names that the word begins, such as `loss` does `loss_probability`, come first; of equally good ones two.
+    """
+    if not isinstance(word, str):
+        return ""
+    names = list(known)
+    alike = [name for name in names if name.startswith((f"{word}_", f"{word}-"))]
+    if not alike:
+        near = difflib.get_close_matches(word, names, n=2)
+        ratios = [difflib.SequenceMatcher(None, name, word).ratio() for name in near]
+        alike = [name for name, ratio in zip(near, ratios, strict=True) if ratio == ratios[0]]
+    return f"; did you mean {' or '.join(alike[:2])}?" if alike else ""
 
 
 def one_of(value: object, known: Iterable[str]) -> str:

@@ -17,6 +17,8 @@ from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.reports.rendering import Frame, draw_frame, layout_of
 
 _WIDTH, _HEIGHT = 1110, 830
+_LEAST_CURVES = 210
+"""Height of curves in pixels; where maps leave less room, the picture is higher."""
 _NARROW = 560
 """Width in pixels up to which curves stand one above the other."""
 
@@ -39,7 +41,9 @@ def mission_picture(recorder: Recorder, end: Frame, title: str, strategy: str, t
     end = replace(end, title=f"{what}: belief of robot_0")
     picture = draw_frame(end, _WIDTH, _HEIGHT)
     room = layout_of(end, _WIDTH, _HEIGHT).room
-    picture[room.top :, room.left :] = _curves(recorder, _WIDTH - room.left, _HEIGHT - room.top)
+    height = max(_HEIGHT - room.top, _LEAST_CURVES)
+    picture = np.pad(picture, ((0, room.top + height - _HEIGHT), (0, 0), (0, 0)), constant_values=255)
+    picture[room.top :, room.left :] = _curves(recorder, _WIDTH - room.left, height)
     pictures = [picture, draw_frame(true_world(end, recorder), _WIDTH, _HEIGHT)] if truth else [picture]
     return packed_png(Image.fromarray(np.concatenate(pictures)))
 

@@ -44,12 +44,22 @@ def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
     return _replaced(scenario, changes)
 
 
-def _meant(settings: object, name: str, known: Sequence[str]) -> str:
-    """End of the message about an unknown field: the part that has such a field, or a field that is alike."""
-    for part in known:
-        if name in getattr(getattr(settings, part, None), "__dataclass_fields__", ()):
-            return f"; did you mean {part}={{{name!r}: …}}?"
-    return did_you_mean(name, known)
+def _meant(settings: object, name: str, value: object, known: Sequence[str]) -> str:
+    """End of the message about an unknown field: the part that has such a field, or a field that is alike.
+
+    Fields that are parts are meant by mappings, and others by other values.
+    """
+    parts = [each for each in known if dataclasses.is_dataclass(getattr(settings, each, None))]
+    inner = [(part, each.name) for part in parts for each in dataclasses.fields(getattr(settings, part))]
+    found = [(part, field) for part, field in inner if field == name]
+    if not any(each.startswith(f"{name}_") for each in known):
+        found += [(part, field) for part, field in inner if field.startswith(f"{name}_")]
+    if found:
+        part, field = found[0]
+        return f"; did you mean {part}={{{field!r}: …}}?"
+    return did_you_mean(
+        name, parts if isinstance(value, Mapping) else [each for each in known if each not in parts]
+    )
 
 
 def _named(settings: object, changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -73,7 +83,7 @@ def _replaced(settings: Settings, changes: Mapping[str, Any]) -> Settings:
             raise SettingError(
                 f"{type(settings).__name__}.{name}",
                 value,
-                "one of the fields " + ", ".join(fields) + _meant(settings, name, known),
+                "one of the fields " + ", ".join(fields) + _meant(settings, name, value, known),
             )
         current = getattr(settings, name)
         nested = isinstance(value, Mapping) and dataclasses.is_dataclass(current)

@@ -54,7 +54,8 @@ def test_unknown_names_and_nested_values_that_are_not_allowed(settings, field):
 
 def test_an_unknown_name_is_answered_with_the_names_that_there_are():
     for settings, part, near in (
-        ({"robotz": 3}, Scenario, "robot"),
+        ({"robotz": 3}, Scenario, "robots"),
+        ({"robotz": {}}, Scenario, "robot"),
         ({"channel": {"bursts": 3}}, Channel, "burst"),
     ):
         allowed = refusal(lambda changes=settings: with_settings(BOX, changes)).allowed

@@ -52,6 +52,18 @@ def test_the_true_world_stands_below_the_end():
     assert sizes == [(1110, 830), (1110, 2 * 830)]
 
 
+def test_labels_of_curves_have_room_below_maps_that_take_most_of_the_height(monkeypatch):
+    figures: list[Figure] = []
+    draw = pictures.png
+    monkeypatch.setattr(pictures, "png", lambda figure: figures.append(figure) or draw(figure))
+    terrain = Grid((70, 50, 35), 1.0, (0.0, 0.0, 0.0))
+    picture = mission_picture(*recorded(started(free_box(robots=2, grid=terrain)), steps=1), "box", "random")
+    assert Image.open(io.BytesIO(picture)).size[1] > 830
+    for axes in figures[0].axes:
+        box = axes.yaxis.label.get_window_extent()
+        assert 0 <= box.y0 < box.y1 <= figures[0].bbox.height
+
+
 @pytest.mark.parametrize(
     ("robots", "content", "label"),
     [(2, "measurements", "measurements"), (2, "summaries", "kbit"), (1, "measurements", "scans")],
