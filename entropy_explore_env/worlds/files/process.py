@@ -203,7 +203,7 @@ class ReaderProcess:
         slow = code in (-getattr(signal, "SIGPROF", 27), -getattr(signal, "SIGKILL", 9))
         if ended or slow:
             within = f"read within {request['cpu_s']:.3g} s of computing"
-            return f"a file that is {within} (read_limit_s allows more)"
+            return f"a file that is {within} (read_limit_s, --read-limit-s, allows more)"
         if code == -signal.SIGABRT:  # libraries in C++ end so where there is no more memory
             return f"a whole {form.kind} that is {memory_allowed(request['memory_bytes'])}"
         return f"a whole {form.kind}"

@@ -119,7 +119,7 @@ def cropped_note(shape: Sequence[int], box: tuple[slice, slice]) -> str:
 def memory_allowed(limit_bytes: int) -> str:
     """Return what is allowed where reading took too much memory."""
     limit = f"read within {limit_bytes >> 20} MiB of memory"
-    return f"{limit} (read_memory_mib allows more, a larger voxel_size_m may need less)"
+    return f"{limit} (read_memory_mib, --read-memory-mib, allows more; a larger voxel_size_m may need less)"
 
 
 def content(path: Path) -> bytes:

@@ -128,7 +128,9 @@ def test_trees_of_large_buildings_are_read_with_the_usual_limits(tmp_path):
 def test_what_takes_too_much_memory_says_which_option_allows_more(tmp_path, monkeypatch):
     path = write_tree(tmp_path / "house.bt", building((180, 160, 80), 1, 6, 0.2), EDGE_M, (0, 0, 0))
     for load in (load_octomap, load_world):
-        with pytest.raises(WorldError, match=r"within 1 MiB of memory \(read_memory_mib allows more"):
+        with pytest.raises(
+            WorldError, match=r"within 1 MiB of memory \(read_memory_mib, --read-memory-mib, allows more"
+        ):
             load(path, read_memory_mib=1.0)
     monkeypatch.setenv(READ_MEMORY_VARIABLE, "400")
     allow_read_memory(None)

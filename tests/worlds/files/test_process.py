@@ -139,7 +139,9 @@ def test_files_are_read_where_the_system_has_no_limits(tmp_path, as_on_windows, 
 def test_what_takes_too_long_is_ended_where_the_system_has_no_limits(picture, as_on_windows, monkeypatch):
     with monkeypatch.context() as soon:
         soon.setattr(process, "_START_S", 1.0)
-        with pytest.raises(WorldError, match=r"read within 0\.05 s of computing \(read_limit_s allows more"):
+        with pytest.raises(
+            WorldError, match=r"read within 0\.05 s of computing \(read_limit_s, --read-limit-s, allows more"
+        ):
             as_on_windows.read(Format("slow", "slow file"), picture, {}, Limits(cpu_s=0.05))
     assert as_on_windows.cost is None
     assert load_world(picture).grid.shape == (11, 7, 1)
