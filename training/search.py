@@ -211,7 +211,7 @@ class Lead(NamedTuple):
 def play(lead: Lead) -> tuple[float, bool]:
     """Run a mission; return its time, the time limit where it was not finished, and whether it was."""
     env = scripted_env(lead.scenario)
-    run_mission(env, PlannedRate(lead.weights, brief=False), lead.seed)
+    run_mission(env, PlannedRate(lead.weights), lead.seed)
     figures = mission_figures(env.missions, 0)
     finished = bool(figures["finished"])
     return float(figures["t_mission_s"]) if finished else lead.scenario.ending.time_limit_s, finished

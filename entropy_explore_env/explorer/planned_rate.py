@@ -13,9 +13,8 @@ every stop. What a robot is, and what its mission asks for, decides how it explo
 - The same robots where a part may stay unseen: bits per time, of unknown voxels alone.
 
 With learned weights (`planner.weights`) a robot chooses among several candidates of the same planner, in any
-mission; half as many viewpoints are refined, since comparing candidates takes about as long. Where robots
-return to their start, one that finds nothing worth a scan goes for the frontier cells that are left, and then
-home.
+mission. Where robots return to their start, one that finds nothing worth a scan goes for the frontier cells
+that are left, and then home.
 """
 
 from __future__ import annotations
@@ -55,14 +54,9 @@ def _wants_everything(scenario: Scenario, kind: RobotKind) -> bool:
 class PlannedRate:
     """Chooses among candidates nearby and far away by bits / s^c; in some plans among frontier cells."""
 
-    def __init__(self, weights: PlannerWeights | None = None, brief: bool = True) -> None:
-        """Take how candidates are chosen.
-
-        Args:
-            weights: Weights of their features; None = by bits / s^c alone.
-            brief: Whether weights choose among candidates of which half as many were refined.
-        """
-        self.weights, self._brief = weights, brief and weights is not None
+    def __init__(self, weights: PlannerWeights | None = None) -> None:
+        """Take the weights of features by which candidates are chosen; None = by bits / s^c alone."""
+        self.weights = weights
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
@@ -77,7 +71,7 @@ class PlannedRate:
             self._tours.reset(scenario, rng)
             self._parts.append(self._tours)
         if not all(self._by_frontiers):
-            self._proposer = ViewProposer(self._proposing(scenario), rng, brief=self._brief)
+            self._proposer = ViewProposer(self._proposing(scenario), rng)
             self._parts.append(self._proposer)
 
     def _proposing(self, scenario: Scenario) -> Scenario:

@@ -24,21 +24,17 @@ class ViewProposer:
     whose actions are candidates, but for the random numbers.
     """
 
-    def __init__(
-        self, scenario: Scenario, rng: np.random.Generator, overlaps: bool = False, brief: bool = False
-    ) -> None:
+    def __init__(self, scenario: Scenario, rng: np.random.Generator, overlaps: bool = False) -> None:
         """Begin a mission.
 
         Args:
             scenario: With candidates as actions; views may be of a scenario with others.
             rng: The random streams of the robots are drawn from it.
             overlaps: Whether overlaps are wanted.
-            brief: Whether half as many viewpoints are refined.
         """
         team, most = scenario.robots, scenario.action.candidates
         self._rules: Rules = rules_of(scenario)
-        self._brief = brief
-        self._proposers = new_proposers(scenario, brief=brief)
+        self._proposers = new_proposers(scenario)
         self._candidates = np.zeros((team, most), CANDIDATE)
         self._experience = np.zeros(team, EXPERIENCE)
         self._experience["candidates_rng"][:, 0] = rng.integers(0, 2**64, team, np.uint64)
@@ -51,7 +47,7 @@ class ViewProposer:
 
     def grow(self, scenario: Scenario, shift: np.ndarray) -> None:
         """Go on in a larger grid, in which voxel (0, 0, 0) of the one before has the indices `shift`."""
-        self._rules, self._proposers = rules_of(scenario), new_proposers(scenario, brief=self._brief)
+        self._rules, self._proposers = rules_of(scenario), new_proposers(scenario)
         for name in ("goal", "far_at", "stood_at", "edge_at", "failed"):
             self._experience[name][..., :3] += shift
 

@@ -136,17 +136,14 @@ def _block_edge(scenario: Scenario, recipe: Recipe) -> int:
     return max(1, round(recipe.block_m / scenario.grid.voxel_size_m))
 
 
-def new_proposers(scenario: Scenario, recipe: Recipe | None = None, brief: bool = False) -> list[Proposer]:
+def new_proposers(scenario: Scenario, recipe: Recipe | None = None) -> list[Proposer]:
     """Return a proposer for each kind of robot of a team; they share memory, for one thread.
 
     Args:
         scenario: With candidates as actions.
         recipe: Of all kinds; None = that of each.
-        brief: Whether half as many viewpoints are refined.
     """
     recipes, voxels = [recipe or recipe_for(kind) for kind in scenario.kinds], scenario.grid.voxels
-    if brief:
-        recipes = [own._replace(refined=own.refined // 2) for own in recipes]
     rows = max(kind.sensor.rows for kind in scenario.kinds)
     scratch = ProposalScratch(
         scan=new_scan_scratch(voxels, _longest_ray(scenario), rows),

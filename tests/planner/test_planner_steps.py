@@ -222,4 +222,3 @@ def test_each_kind_has_its_recipe():
     given = new_proposers(PLAN, NARROW_STRAIGHT)[0].recipe
     assert given.exponent == NARROW_STRAIGHT.exponent and given.turns == NARROW_STRAIGHT.turns
     assert new_proposers(PLAN)[0].recipe.exponent == ALL_AROUND.exponent
-    assert new_proposers(PLAN, brief=True)[0].recipe == ALL_AROUND._replace(refined=ALL_AROUND.refined // 2)
