@@ -17,6 +17,7 @@ from benchmarks.planning import FLOOR, cluttered
 from benchmarks.rows import Effort, Goal, Row, alone, compared, timed
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import EntropyExploreError, counted
+from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenario import Scenario
@@ -66,18 +67,40 @@ def deciding_rows(effort: Effort) -> list[Row]:
     ]
 
 
+class _Beside:
+    """The planner, which leads the mission, and learned weights, which decide in the same moments."""
+
+    def __init__(self) -> None:
+        """Measure nothing yet."""
+        self._planner, self._weights = make_strategy("planned-rate"), make_strategy("pretrained:plans")
+        self.planner_ms: list[float] = []
+        self.weights_ms: list[float] = []
+
+    def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
+        """Begin a mission."""
+        for strategy in (self._planner, self._weights):
+            strategy.reset(scenario, rng.spawn(1)[0])
+
+    def choose(self, view: RobotView) -> np.ndarray:
+        """Return the planner's choice."""
+        begun = time.thread_time()
+        chosen = self._planner.choose(view)
+        planned = time.thread_time()
+        self._weights.choose(view)
+        self.planner_ms.append(1e3 * (planned - begun))
+        self.weights_ms.append(1e3 * (time.thread_time() - planned))
+        return chosen
+
+
 def weights_row(effort: Effort) -> Row:
-    """Return the mean decision by learned weights beside the planner's, in missions of the same starts."""
-    team = {"robots": 3, "max_cycles": effort.steps}
-    env = EntropyExploreEnv(with_settings(scripted(OFFICE), team))
-    means_ms: dict[str, list[float]] = {"pretrained:plans": [], "planned-rate": []}
+    """Return the mean decision by learned weights beside the planner's, in the same moments of missions."""
+    env = EntropyExploreEnv(with_settings(scripted(OFFICE), {"robots": 3, "max_cycles": effort.steps}))
+    means_ms = list[tuple[float, float]]()
     for seed in range(1 + effort.long_rounds):
-        for name, of_rounds in means_ms.items():
-            watch = Stopwatch(make_strategy(name), time.thread_time)
-            run_mission(env, watch, seed)
-            if seed > 0:  # kernels are compiled in the first round
-                of_rounds.append(statistics.fmean(watch.decisions_ms))
-    ours, planner = means_ms.values()
+        beside = _Beside()
+        run_mission(env, beside, seed)
+        means_ms.append((statistics.fmean(beside.weights_ms), statistics.fmean(beside.planner_ms)))
+    ours, planner = zip(*means_ms[1:], strict=True)  # kernels are compiled in the first round
     job = "a decision of pretrained:plans, office, 3 robots"
     return compared(job, "planned-rate", ours, planner, "ms", Goal("≤", 1.2))
 

@@ -61,7 +61,7 @@ class ProposalScratch(NamedTuple):
     marks: np.ndarray  # (V,) uint64, zeros, which it is again afterwards: bit k = candidate k sees the voxel
     seen: np.ndarray  # (V,) int32, voxels that some candidate sees
     batch: np.ndarray  # (_BATCH,) uint64, marks of some voxels
-    batch_shares: np.ndarray  # (_BATCH,) float64, 1/n of these voxels, each seen by n candidates
+    unique: np.ndarray  # (K,) float64, sums over voxels seen of 1/n, each seen by n candidates
     views: np.ndarray  # (K,) VIEW
     taken: np.ndarray  # (K,) int64, numbers in the pool of the candidates
     common: np.ndarray  # (K, K) int64, voxels that both of two candidates see
@@ -121,7 +121,7 @@ def _arrays(scenario: Scenario, recipes: Sequence[Recipe]) -> dict[str, tuple[tu
         "marks": ((voxels,), np.uint64),
         "seen": ((voxels,), np.int32),
         "batch": ((_BATCH,), np.uint64),
-        "batch_shares": ((_BATCH,), np.float64),
+        "unique": ((candidates,), np.float64),
         "views": ((candidates,), VIEW),
         "taken": ((candidates,), np.int64),
         "common": ((candidates, candidates), np.int64),

@@ -156,28 +156,21 @@ def _slivers_beside(belief, voxel, known, marks, bit):
 
 
 @lean_kernel
-def _bits_set(marks):
-    """Return how many bits of a number are set."""
-    count = 0
-    while marks != 0:
-        count += 1
-        marks &= marks - _ONE
-    return count
-
-
-@lean_kernel
 def clear_marks(proposer, count, marked):
     """Sum up how unique the views of `count` candidates are, and clear the marks of the voxels seen."""
     scratch = proposer.scratch
-    batch, shares = scratch.batch, scratch.batch_shares
+    batch, unique = scratch.batch, scratch.unique
+    for number in range(count):
+        unique[number] = 0.0
     for begin in range(0, marked, len(batch)):
-        voxels = _read_batch(scratch, scratch.seen, begin, marked)
-        for i in range(voxels):
-            shares[i] = 1.0 / _bits_set(batch[i])
-        for number in range(count):
-            bit, unique = np.uint64(number), scratch.views[number].unique
-            for i in range(voxels):
-                unique += shares[i] * np.float64((batch[i] >> bit) & _ONE)
-            scratch.views[number].unique = unique
+        for i in range(_read_batch(scratch, scratch.seen, begin, marked)):
+            seen_by = np.uint64(0)
+            for number in range(count):
+                seen_by += (batch[i] >> np.uint64(number)) & _ONE
+            share = 1.0 / np.float64(seen_by)
+            for number in range(count):
+                unique[number] += share * np.float64((batch[i] >> np.uint64(number)) & _ONE)
+    for number in range(count):
+        scratch.views[number].unique = unique[number]
     for i in range(marked):
         scratch.marks[scratch.seen[i]] = 0
