@@ -13,13 +13,13 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.robots.motion import MoveEnd
 
-_MOVE_ENDS, _MISSION_ENDS = list(MoveEnd), list(MissionEnd)
+_MOVE_ENDS = list(MoveEnd)
 
 END_FIGURES = ("t_mission_s", "bits_gained_per_bit_sent")
 """Figures that infos hold by themselves, as numbers that loggers of episodes can show:
 Stable-Baselines3's Monitor and VecMonitor by `info_keywords=END_FIGURES`."""
 _NOT_YET: dict[str, float] = dict.fromkeys(END_FIGURES, 0.0)
-"""Not NaN, which checkers of environments hold for chance."""
+"""Not NaN, which differs from itself: to checkers of environments it looks like chance."""
 
 
 def end_figures(figures: Mapping[str, Any]) -> dict[str, float]:
@@ -45,8 +45,10 @@ def robot_infos(missions: Missions, mission: int) -> list[dict[str, Any]]:
     """
     clock = missions.state.missions[mission]
     robots = missions.state.robots[mission]
-    time_s, end = float(clock["time_s"]), _MISSION_ENDS[clock["end"]]
-    at_end = end_figures(mission_figures(missions, mission)) if end else _NOT_YET
+    time_s, end = float(clock["time_s"]), missions.over(mission)
+    at_end = _NOT_YET
+    if end is not MissionEnd.RUNNING:
+        at_end = end_figures(mission_figures(missions, mission, floor=False))
     world_number = int(missions.world_numbers[mission])
     infos: list[dict[str, Any]] = [
         {
