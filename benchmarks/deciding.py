@@ -72,23 +72,18 @@ class _Beside:
 
     def __init__(self) -> None:
         """Measure nothing yet."""
-        self._planner, self._weights = make_strategy("planned-rate"), make_strategy("pretrained:plans")
-        self.planner_ms: list[float] = []
-        self.weights_ms: list[float] = []
+        self.planner = Stopwatch(make_strategy("planned-rate"), time.thread_time)
+        self.weights = Stopwatch(make_strategy("pretrained:plans"), time.thread_time)
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
-        for strategy in (self._planner, self._weights):
+        for strategy in (self.planner, self.weights):
             strategy.reset(scenario, rng.spawn(1)[0])
 
     def choose(self, view: RobotView) -> np.ndarray:
-        """Return the planner's choice."""
-        begun = time.thread_time()
-        chosen = self._planner.choose(view)
-        planned = time.thread_time()
-        self._weights.choose(view)
-        self.planner_ms.append(1e3 * (planned - begun))
-        self.weights_ms.append(1e3 * (time.thread_time() - planned))
+        """Return the planner's choice, after which the weights choose as well."""
+        chosen = self.planner.choose(view)
+        self.weights.choose(view)
         return chosen
 
 
@@ -99,7 +94,8 @@ def weights_row(effort: Effort) -> Row:
     for seed in range(1 + effort.long_rounds):
         beside = _Beside()
         run_mission(env, beside, seed)
-        means_ms.append((statistics.fmean(beside.weights_ms), statistics.fmean(beside.planner_ms)))
+        weights_ms, planner_ms = beside.weights.decisions_ms, beside.planner.decisions_ms
+        means_ms.append((statistics.fmean(weights_ms), statistics.fmean(planner_ms)))
     ours, planner = zip(*means_ms[1:], strict=True)  # kernels are compiled in the first round
     job = "a decision of pretrained:plans, office, 3 robots"
     return compared(job, "planned-rate", ours, planner, "ms", Goal("≤", 1.2))
