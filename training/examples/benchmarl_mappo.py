@@ -12,7 +12,7 @@ import entropy_explore_env as eee
 
 
 class NumbersOnly(BaseParallelWrapper):
-    """Infos without text: the mask of actions."""
+    """Infos cut down to the mask of actions."""
 
     def reset(self, seed=None, options=None):
         observations, infos = super().reset(seed, options)

@@ -1,4 +1,4 @@
-"""PPO for a team in TorchRL: `PettingZooWrapper` takes infos that are numbers, and a mask of actions.
+"""PPO for a team in TorchRL: `PettingZooWrapper` makes tensors of infos, and finds the mask of actions.
 
 With the word `candidates` robots choose among viewpoints that a planner proposes.
 """
@@ -7,7 +7,6 @@ import sys
 from typing import Any
 
 import torch
-from pettingzoo.utils import BaseParallelWrapper
 from tensordict import TensorDict
 from tensordict.nn import InteractionType, TensorDictModule
 from torch import nn
@@ -21,23 +20,11 @@ import entropy_explore_env as eee
 UPDATES, MISSIONS, EPOCHS, GAMMA, LAMBDA = 3, 4, 6, 0.99, 0.95
 
 
-class NumbersOnly(BaseParallelWrapper):
-    """Infos without text: whether a robot decides, and which actions make sense."""
-
-    def reset(self, seed=None, options=None):
-        observations, infos = super().reset(seed, options)
-        return observations, {a: {k: infos[a][k] for k in ("deciding", "action_mask")} for a in infos}
-
-    def step(self, actions):
-        *results, infos = super().step(actions)
-        return *results, {a: {k: infos[a][k] for k in ("deciding", "action_mask")} for a in infos}
-
-
 torch.manual_seed(0)
 moves: Any = {"kind": "discrete", "moves": "axes"}
 action: Any = {"kind": "candidates"} if "candidates" in sys.argv[1:] else moves
 team = eee.parallel_env("room", robots=3, observation={"flat": True}, action=action, time_limit_s=30.0)
-env = PettingZooWrapper(NumbersOnly(team), seed=0)
+env = PettingZooWrapper(team, seed=0)
 numbers = env.observation_spec["robot", "observation"].shape[-1]
 actions = env.observation_spec["robot", "action_mask"].shape[-1]
 scores = nn.Sequential(nn.Linear(numbers, 64), nn.Tanh(), nn.Linear(64, actions))
