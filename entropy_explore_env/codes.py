@@ -6,7 +6,7 @@ import enum
 
 
 class Coded(int, enum.Enum):
-    """Enum of sentences, its `value`s; as a number a member is its place, from 0, and prints as its name."""
+    """Enum of sentences, its `value`s; a member equals its place, from 0, and prints as its name."""
 
     def __new__(cls, sentence: str) -> Coded:
         """Return a member numbered after those before it."""

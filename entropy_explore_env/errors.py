@@ -47,7 +47,8 @@ def _passed_on(value: object) -> object:
 def did_you_mean(word: object, known: Iterable[str]) -> str:
     """Return the known name most like a word, as the end of a message; empty where none is like it.
 
-    Names that the word begins, such as `loss` does `loss_probability`, come first; of equally good ones two.
+    Names that begin with the word, such as `loss_probability` for `loss`, come first; of equally good names
+    two are named.
     """
     if not isinstance(word, str):
         return ""

@@ -42,7 +42,7 @@ class ElevationMap(NamedTuple):
 def elevation_map(
     mean: np.ndarray, precision: np.ndarray, grid: Grid, sigma_prior: float, sigma_min: float
 ) -> ElevationMap:
-    """Return heights of the ground in a voxel belief.
+    """Return the heights of the ground in a voxel belief.
 
     The ground of a column ends in its highest measured voxel with a mean coverage μ above ½, at the height
     vsz·(k + μ) above the floor; its standard deviation is that of the coverage, times vsz. Where no voxel is

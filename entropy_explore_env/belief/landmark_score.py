@@ -26,7 +26,7 @@ _OCCUPIED = 0.5
 
 @lean_kernel
 def landmark_score(belief, prior, voxel):
-    """Return FEF of a voxel, from 0 to 2.
+    """Return the FEF of a voxel, from 0 to 2.
 
     Args:
         prior: Precision of a voxel that was never measured, float32.

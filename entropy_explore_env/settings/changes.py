@@ -45,9 +45,9 @@ def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
 
 
 def _meant(settings: object, name: str, value: object, known: Sequence[str]) -> str:
-    """End of the message about an unknown field: the part that has such a field, or a field that is alike.
+    """Return the end of the message about an unknown field: a part that has such a field, or one like it.
 
-    Fields that are parts are meant by mappings, and others by other values.
+    Whoever gives a mapping means a part, and whoever gives another value a field that is none.
     """
     parts = [each for each in known if dataclasses.is_dataclass(getattr(settings, each, None))]
     inner = [(part, each.name) for part in parts for each in dataclasses.fields(getattr(settings, part))]
@@ -57,9 +57,8 @@ def _meant(settings: object, name: str, value: object, known: Sequence[str]) -> 
     if found:
         part, field = found[0]
         return f"; did you mean {part}={{{field!r}: …}}?"
-    return did_you_mean(
-        name, parts if isinstance(value, Mapping) else [each for each in known if each not in parts]
-    )
+    alike = parts if isinstance(value, Mapping) else [each for each in known if each not in parts]
+    return did_you_mean(name, alike)
 
 
 def _named(settings: object, changes: Mapping[str, Any]) -> dict[str, Any]:

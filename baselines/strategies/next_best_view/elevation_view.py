@@ -177,7 +177,7 @@ def fill_visibility(ground, camera, pose, seen):
 
 @inlined_kernel
 def _span(middle, reach, most):
-    """Return the first and last but one of the columns along an axis that can be in reach."""
+    """Return the first, and one past the last, of the columns along an axis that can be in reach."""
     if math.isinf(reach):
         return 0, most
     return max(math.floor(middle - reach), 0), min(math.floor(middle + reach) + 1, most)

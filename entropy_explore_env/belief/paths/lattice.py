@@ -183,7 +183,7 @@ def belief_costs(
     unknown_cost: float = 1.0,
     no_fly: np.ndarray | None = None,
 ) -> Costs:
-    """Return traversal costs of a belief.
+    """Return the traversal costs of a belief.
 
     Args:
         mean: (X, Y, Z) or (V,) float32 expected coverage; voxels above ½ are impassable.
