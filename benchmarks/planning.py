@@ -37,7 +37,7 @@ def cluttered(shape: tuple[int, int, int], share: float, seed: int = 0) -> np.nd
 
 
 def maze(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
-    """(X, Y, 1) bool, corridors one cell wide with one path between any two places (a depth-first maze)."""
+    """Return (X, Y, 1) bool, corridors one cell wide, one path between any two cells (a depth-first maze)."""
     rng, covered = np.random.default_rng(seed), np.ones(shape, bool)
     size, at = ((shape[0] - 1) // 2, (shape[1] - 1) // 2), (0, 0)
     path, seen = [at], np.zeros(size, bool)

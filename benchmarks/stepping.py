@@ -154,7 +154,7 @@ def step_rows(effort: Effort) -> list[Row]:
 
 
 def vector_rows(effort: Effort) -> list[Row]:
-    """Robot-steps a second of the VectorEnv, beside ParallelEnvs, and of two threads beside one."""
+    """Return rows of robot-steps a second: the VectorEnv beside ParallelEnvs, and two threads beside one."""
     rows = [row for missions in effort.missions for row in batch_rows(missions, effort)]
     many, few = Batch(max(effort.missions), 1), Batch(16, 1)
     job, calls = f"Python calls in a VectorEnv.step, {many.missions} missions", Goal("=", 1.0)
@@ -163,7 +163,7 @@ def vector_rows(effort: Effort) -> list[Row]:
 
 
 def batch_rows(missions: int, effort: Effort) -> list[Row]:
-    """Rows of one batch size: beside one ParallelEnv, as many in a Python loop, and two threads."""
+    """Return rows of one batch size: beside one ParallelEnv, as many in a Python loop, and two threads."""
     steps, some = max(_BATCH_STEPS, effort.steps // missions), min(missions, _SINGLES)
     single, batch = Team(ENDLESS), Batch(missions, 1)
 
@@ -218,7 +218,7 @@ def python_calls(batch: Batch, steps: int = 5) -> float:
 
 
 def size_rows(effort: Effort) -> list[Row]:
-    """Microseconds a step in larger worlds beside the room: what rays cost, not what the world costs.
+    """Return rows of microseconds a step in larger worlds beside the room: what rays cost, not the world.
 
     Two robots observe the pooled overview of their beliefs; their rays end after 2.5 m, so that they do the
     same work in any world.

@@ -66,7 +66,7 @@ class Normaliser(RunningMeanStd):
         return np.where(std > _MIN_STD, std, 1.0)
 
     def normalise(self, values: np.ndarray) -> np.ndarray:
-        """(values - mean) / std; with one component, of values of any shape."""
+        """Return (values - mean) / std; with one component, of values of any shape."""
         return (values - self.mean) / self.std
 
     def denormalise(self, values: np.ndarray) -> np.ndarray:

@@ -321,7 +321,7 @@ def policy_keywords(
     privileged: int = 0,
     attention_layers: int = ATTENTION_LAYERS,
 ) -> dict[str, Any]:
-    """`policy_kwargs` of a Stable-Baselines3 policy: orthogonal weights, tanh, separate actor and critic.
+    """Return a Stable-Baselines3 policy's `policy_kwargs`: orthogonal weights, tanh, actor and critic apart.
 
     Args:
         features: A name of NETWORKS.

@@ -490,7 +490,7 @@ class DecisionPPO(PPO):
     def choose(
         self, observations: np.ndarray, deciding: np.ndarray
     ) -> tuple[np.ndarray, torch.Tensor, torch.Tensor]:
-        """Actions (N,) or (N, K), values (N,) and log-probabilities (N,); 0 where a robot does not decide."""
+        """Return actions (N,) or (N, K), values and log-probabilities (N,); 0 where robots do not decide."""
         shape: Any = self.action_space.shape
         rows = [np.zeros((len(deciding), *shape), self.action_space.dtype)]
         rows += [np.zeros(len(deciding), np.float32) for _ in range(2)]

@@ -289,7 +289,7 @@ class DecisionAdvantages(ConnectorV2):
 
 
 def seconds_between(chunk: Any) -> np.ndarray:  # noqa: ANN401 - RLlib's SingleAgentEpisode
-    """(L,) simulated seconds from each of a chunk's decisions to the next one; without the additional row."""
+    """Return (L,) simulated seconds from each of a chunk's decisions to the next; without the added row."""
     times_s = [info["time_s"] for info in chunk.get_infos(slice(0, len(chunk)))]
     return np.diff(np.array(times_s, np.float64))
 

@@ -44,7 +44,7 @@ def validation_seeds(missions: int) -> list[int]:
 
 
 def pair_seeds(seed: int, part: int, pairs: int) -> list[int]:
-    """Seeds of the pairs of missions of one part of a search; those of learning, and never one twice."""
+    """Return the seeds of pairs of missions of a part of a search; those of learning, and never one twice."""
     return _drawn(seed, (_PAIRS_KEY, part), pairs)
 
 
@@ -154,7 +154,7 @@ class Validator:
         )
 
     def _planner_ratio(self, times_s: np.ndarray) -> float:
-        """Geometric mean of mission times (E,) over those of the planner, which leads the missions once."""
+        """Return the geometric mean of mission times (E,) over the planner's, which leads them once."""
         if self._planner_s is None:
             led = self.run(lambda observations: np.zeros(len(observations), np.int64))  # 0 = its own choice
             assert led is not None

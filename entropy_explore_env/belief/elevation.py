@@ -96,7 +96,7 @@ def _fill_ground(mean, precision, prior, unit, ground):
 def completed(
     height_m: np.ndarray, known: np.ndarray, tolerance_m: float = 1e-4, begin_m: np.ndarray | None = None
 ) -> np.ndarray:
-    """Heights with those of unknown columns filled in: each the mean of its neighbours (Sujan, fig. 7).
+    """Return heights with unknown columns filled in: each the mean of its neighbours (Sujan, fig. 7).
 
     The paper's Markovian approximation: unknown columns begin at the lowest known height, the worst case
     for a robot at an edge, and take the mean of their four neighbours (fewer at the border) until nothing

@@ -50,7 +50,7 @@ def entropy_gradient(precision, i, j, k, voxel_size_m):
 
 @inlined_kernel
 def remaining_bits(precision, known_precision):
-    """Entropy of a voxel above that of a known one, H(C_l) ≥ 0 (RochaMI, eq. 1; see `visibility`)."""
+    """Return a voxel's entropy above that of a known one, H(C_l) ≥ 0 (RochaMI, eq. 1; see `visibility`)."""
     return 0.5 * math.log2(max(known_precision / precision, 1.0))
 
 

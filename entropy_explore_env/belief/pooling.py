@@ -60,7 +60,7 @@ def fresh_sums(cells: Cells) -> np.ndarray:
 
 @inlined_kernel
 def normalised_entropy(prior_precision, end_precision, precision):
-    """1 at the prior, 0 at the voxel entropy that ends a mission, clipped in between."""
+    """Return 1 at the prior, 0 at the voxel entropy that ends a mission, clipped in between."""
     span = math.log2(end_precision / prior_precision)
     return min(max(math.log2(end_precision / precision) / span, 0.0), 1.0)
 

@@ -49,7 +49,7 @@ def cone_of(viewpoint: np.ndarray, radius: float, half_angle_rad: float) -> np.n
 
 @inlined_kernel
 def in_cone(cone, dx, dy, dz):
-    """Whether a point, relative to the apex, lies in a CONE (RochaMI, eq. 2); a point on its face does."""
+    """Return whether a point, relative to the apex, lies in a CONE or on its face (RochaMI, eq. 2)."""
     squared = dx * dx + dy * dy + dz * dz
     along = dx * cone.gaze[0] + dy * cone.gaze[1] + dz * cone.gaze[2]
     return squared <= cone.radius * cone.radius and along >= math.sqrt(squared) * cone.cosine - _SLACK
@@ -139,7 +139,7 @@ def mark_cones(cones, size, marks, mark):
 
 @lean_kernel
 def visible_bits(cone, size, precision, known_precision, marks):
-    """Entropy that a cone covers, and how much of it marked voxels cover, too (RochaMI, eqs. 7 and 10).
+    """Return the entropy that a cone covers, and its part in marked voxels (RochaMI, eqs. 7 and 10).
 
     Args:
         known_precision: 1/σ² of a voxel that counts as known.

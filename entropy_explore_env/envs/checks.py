@@ -70,7 +70,7 @@ class ActionChecker:
         return continuous, discrete
 
     def table(self, actions: object, missions: int, robots: int) -> tuple[np.ndarray, np.ndarray]:
-        """Actions of many missions as arrays.
+        """Return actions of many missions as arrays.
 
         Args:
             actions: (E, A, N) numbers, or (E, A) whole numbers; without the axis A for one robot.

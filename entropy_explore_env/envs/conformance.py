@@ -56,7 +56,7 @@ _ROBOT_INFOS = ("deciding", "entropy_bits", "own_bits", "received_bits")
 
 
 def check_spaces(task: Task) -> None:
-    """Every observation lies in its space, spaces stay the same objects, rewards are finite."""
+    """Check that observations lie in their spaces, spaces stay the same objects, and rewards are finite."""
     env = task.env()
     agents = env.possible_agents
     spaces = [env.state_space, *map(env.observation_space, agents), *map(env.action_space, agents)]
@@ -90,7 +90,7 @@ def check_repeatable(task: Task) -> None:
 
 
 def check_processes(task: Task) -> None:
-    """Two fresh processes play the same episodes as this one."""
+    """Check that two fresh processes play the same episodes as this one."""
     with ThreadPoolExecutor(2) as pool:
         answers = [pool.submit(_ask_child, task, hash_seed) for hash_seed in ("1", "2")]
         here = story(play(task.env(), task))
@@ -152,7 +152,7 @@ def play_batch(task: Task, missions: int, threads: int) -> tuple[Leaves, list[Le
 
 
 def row_of(result: tuple[Any, ...], mission: int) -> dict[str, Any]:
-    """One mission of what a VectorEnv returned; after a reset, rewards and ends are 0."""
+    """Return one mission of what a VectorEnv returned; after a reset, rewards and ends are 0."""
     observations, infos = result[0], result[-1]
     ends = [float(array[mission]) for array in result[1:4]] if len(result) == 5 else [0.0, 0.0, 0.0]
     parts = observations if isinstance(observations, dict) else {"flat": observations}

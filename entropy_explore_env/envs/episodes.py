@@ -71,7 +71,7 @@ class Task:
         return rng.uniform(-1.0, 1.0, shape).astype(np.float32)
 
     def table(self, missions: int, episode: int, step: int) -> np.ndarray:
-        """Actions of many missions as a VectorEnv takes them: no axis A for one robot."""
+        """Return actions of many missions as a VectorEnv takes them: no axis A for one robot."""
         actions = np.stack([self.actions(mission, episode, step) for mission in range(missions)])
         return actions[:, 0] if self.scenario.robots == 1 else actions
 

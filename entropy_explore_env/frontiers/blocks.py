@@ -197,7 +197,7 @@ def cell_at(size, x, y, z):
 
 @inlined_kernel
 def shares_face(blocks, marks, mask, value, x, y, z):
-    """Whether a neighbour of a cell, of planar robots in the layer, has a value in the masked (N,) marks."""
+    """Return whether a cell's neighbour (of planar robots, in the layer) has a value in masked (N,) marks."""
     size, found = blocks.size, False
     for axis in range(2 if blocks.layer >= 0 else 3):
         for step in (-1, 1):

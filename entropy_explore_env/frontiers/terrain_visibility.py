@@ -41,7 +41,7 @@ class ViewModel(NamedTuple):
 
 @lean_kernel
 def mean_ground(terrain, x, y, patch):
-    """z_av: mean ground of the mapped columns within `patch` of one along both axes; 0 where none is."""
+    """Return z_av: mean ground of the mapped columns within `patch` of one along both axes; 0 = none."""
     total, count = 0.0, 0
     for i in range(max(x - patch, 0), min(x + patch, terrain.size[0] - 1) + 1):
         for j in range(max(y - patch, 0), min(y + patch, terrain.size[1] - 1) + 1):

@@ -185,7 +185,7 @@ def first_viewing_place(blocks, places, voxels, reach):
 
 @lean_kernel
 def is_visible(blocks, place, voxel, reach):
-    """Whether known free space leads from a voxel's centre straight to another's face, within reach."""
+    """Return whether known free space leads from a voxel's centre straight to a face of another in reach."""
     a, b = grid_index(blocks.size, place), grid_index(blocks.size, voxel)
     x, y, z = float(b[0] - a[0]), float(b[1] - a[1]), float(b[2] - a[2])
     length = math.sqrt(x * x + y * y + z * z)

@@ -25,7 +25,7 @@ _ASKED = 0.875
 
 @lean_kernel
 def mission_end(mission):
-    """Code of a MissionEnd after an event: what the mission asks for, or that no robot is left for it."""
+    """Return the code of a MissionEnd after an event: the goal is reached, or no robot is left for it."""
     clock, team = mission.clock, mission.team
     if team.params[0].by_seen:
         end = _SEEN if seen_enough(mission) else _RUNNING
@@ -54,7 +54,7 @@ def mapped_enough(team, clock):
 
 @lean_kernel
 def seen_enough(mission):
-    """Whether the team has seen what ends the mission, and, where it is asked, all maps or one hold it."""
+    """Return whether the team has seen what ends the mission and, where asked, all maps or one hold it."""
     clock, team, joint = mission.clock, mission.team, mission.joint
     if clock.explored_visible < clock.explored_end or clock.explored_free < clock.explored_free_end:
         return False

@@ -55,7 +55,7 @@ def next_event(shared, robots, messages, phases, faults):
 
 @lean_kernel
 def next_robot(robots):
-    """(robot, time) of the next that scans, under way or at its stop, has waited, or may decide under way.
+    """Return (robot, time) of the next that scans (under way or not), has waited, or may decide under way.
 
     The time is inf if all of them stand and decide.
     """

@@ -61,7 +61,7 @@ def fiducial_places(scenario: Scenario, world: World, seed: int, episode: int) -
 
 
 def _surfaces(scenario: Scenario, world: World) -> tuple[np.ndarray, np.ndarray]:
-    """(N, 3) free voxels beside something solid, and (N, 3) directions to its first such face, in C order."""
+    """Return (N, 3) free voxels beside solid ones, and (N, 3) directions to the first such face (C order)."""
     solid = np.pad(world.occupied, 1, constant_values=True)
     free = world.visible(scenario) & ~world.occupied
     if scenario.in_planes:
@@ -108,7 +108,7 @@ def way_to(place, other):
 
 @lean_kernel
 def measured_way(own, estimate, away):
-    """(x, y, z) of a landmark truly `away`, as a robot measures it, turned by the yaw that it believes."""
+    """Return (x, y, z) of a landmark truly `away`, as a robot measures it, turned by the yaw it believes."""
     error = sighting_error(away, own.range_sigma_m, own.bearing_sigma_rad, estimate.sighting_rng)
     x, y, z = away[0] + error[0], away[1] + error[1], away[2] + error[2]
     along, across = math.cos(estimate.error[3]), math.sin(estimate.error[3])
@@ -117,7 +117,7 @@ def measured_way(own, estimate, away):
 
 @lean_kernel
 def in_sight(params, sensor, scene, pose, away):
-    """Whether a scan sights a landmark that is `away`: in range, in its field of view, nothing before it.
+    """Return whether a scan sights a landmark that is `away`: in range, in view, nothing before it.
 
     `params` are LOCALIZATION_PARAMS, `sensor` SENSOR_PARAMS of the robot.
     """

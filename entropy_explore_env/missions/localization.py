@@ -118,7 +118,7 @@ def estimate_in(estimates, mission, index):
 
 @lean_kernel
 def pose_variance(estimate):
-    """(place, yaw): variance of a robot's place, summed over its axes in m², and of its yaw in rad²."""
+    """Return (place, yaw): variance of a robot's place, summed over axes in m², and of its yaw in rad²."""
     if estimate is None:  # known while compiling: nothing of the rest is compiled
         return 0.0, 0.0
     covariance = estimate.covariance
@@ -127,7 +127,7 @@ def pose_variance(estimate):
 
 @lean_kernel
 def believed_pose(estimate, params, pose):
-    """Pose (x, y, z, yaw, pitch), in the workspace, at which a robot that is at a true one believes to be.
+    """Return the pose (x, y, z, yaw, pitch), in the workspace, where a robot at a true one believes to be.
 
     Args:
         pose: Of the robot, in the world.

@@ -91,13 +91,13 @@ def speed_at(params, robot, time_s):
 
 @lean_kernel
 def place_at(params, robot, time_s):
-    """(x, y, z, corners): where a robot is at a time as in `pose_at`, and how many corners it has passed."""
+    """Return (x, y, z, corners): where a robot is at a time as in `pose_at`, and the corners it passed."""
     return place_with_left(robot, share_left(params, robot, time_s))
 
 
 @lean_kernel
 def place_with_left(robot, left):
-    """(x, y, z, corners) where this share of a robot's path is left, and how many corners are behind it."""
+    """Return (x, y, z, corners) where this share of a robot's path is left, and how many it has passed."""
     end, passed = path_point(robot, robot.corners + 1), robot.corners
     if left <= 0.0:
         return end[0], end[1], end[2], passed
@@ -120,7 +120,7 @@ def place_with_left(robot, left):
 
 @lean_kernel
 def pose_at(params, robot, time_s):
-    """Pose (x, y, z, yaw, pitch) of a robot at a time between its departure and its next one."""
+    """Return the pose (x, y, z, yaw, pitch) of a robot at a time between its departure and its next one."""
     origin, goal = robot.origin, robot.goal
     x, y, z, _ = place_at(params, robot, time_s)
     yaw, pitch, elapsed_s = goal[3], goal[4], time_s - robot.depart_s

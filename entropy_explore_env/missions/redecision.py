@@ -81,7 +81,7 @@ def decide(params, actions, robot, estimate, time_s, continuous, discrete, choic
 
 @lean_kernel
 def keeps_target(params, choice, target):
-    """Whether a robot chose the viewpoint that it has, pulled within reach as `encode_viewpoint` does."""
+    """Return whether a robot chose the viewpoint that it has, within reach as `encode_viewpoint` pulls it."""
     axes = 2 if params.planar else 3
     pose, viewpoint = choice.pose, choice.viewpoint
     length = 0.0
@@ -107,7 +107,7 @@ def braking_metres(params, robot, time_s):
 
 @lean_kernel
 def resting_place(params, robot, time_s, braking_m):
-    """(x, y, z, corners): where a robot would come to rest on the path that it is on; see `place_at`."""
+    """Return (x, y, z, corners) where a robot would come to rest on its present path; see `place_at`."""
     left = share_left(params, robot, time_s)
     if braking_m > 0.0:
         left -= braking_m / robot.path_m

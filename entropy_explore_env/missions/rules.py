@@ -246,7 +246,7 @@ def _collision_body(scenario: Scenario, robot: Robot) -> Body:
 
 
 def overview_shape(scenario: Scenario) -> tuple[int, int, int] | None:
-    """Cells of the overview: as set, but no more than there are voxels along an axis; None without it."""
+    """Return the overview's cells: as set, but at most the voxels along an axis; None without it."""
     if not scenario.observation.overview:
         return None
     x, y, z = scenario.observation.overview_shape

@@ -62,7 +62,7 @@ def _distances_apart_m(scenario: Scenario, robot: int) -> np.ndarray:
 
 
 def _first_apart(grid: Grid, tried: np.ndarray, taken: np.ndarray, apart_m: np.ndarray) -> np.ndarray | None:
-    """(3,) centre of the first of the voxels (N,) that is as far as (K,) asks from those taken (K, 3)."""
+    """Return the (3,) centre of the first of the voxels (N,) that is (K,) apart from those taken (K, 3)."""
     centres = grid.centre_of(np.stack(np.unravel_index(tried, grid.shape), axis=-1))
     gaps = np.sqrt(((centres[:, None] - taken) ** 2).sum(axis=-1))
     clear = np.flatnonzero((gaps >= apart_m).all(axis=1))

@@ -175,7 +175,7 @@ def _landmarks(missions: Missions, mission: int, robot: int) -> np.ndarray:
 
 
 def _candidates(missions: Missions, mission: int, robot: int) -> np.ndarray:
-    """(K, 5) the viewpoints that are proposed to a robot that decides; none where actions are others."""
+    """Return (K, 5) the viewpoints proposed to a robot that decides; none where actions are others."""
     state = missions.state
     if not state.candidates.size or not state.robots[mission, robot]["deciding"]:
         return read_only(np.zeros((0, 5)))

@@ -88,7 +88,7 @@ class SpeedProfile(NamedTuple):
 
 @inlined_kernel
 def _run_up_m(profile):
-    """±v²/2a: by how much the drive from rest to rest is longer; negative where the robot brakes first."""
+    """Return ±v²/2a: by how much a drive from rest to rest is longer; negative if the robot brakes first."""
     return 0.5 * profile.acceleration_m_s2 * profile.lead_s * abs(profile.lead_s)
 
 
@@ -127,7 +127,7 @@ def driven_share(elapsed_s, profile):
 
 @lean_kernel
 def speed_after(elapsed_s, profile):
-    """Speed on the path, in m/s, `elapsed_s` after the drive's start; 0 at its end and after it."""
+    """Return the speed on the path, in m/s, `elapsed_s` after the drive's start; 0 at its end and later."""
     _, duration, ramp = _from_rest_to_rest(profile)
     since_rest_s = elapsed_s + profile.lead_s
     if since_rest_s >= duration or profile.length_m <= 0.0:

@@ -67,7 +67,7 @@ class Drive(NamedTuple):
 
 @lean_kernel
 def growth_of_error(covariance, surveyor, drive, lever_m, after):
-    """LE of a drive (Sujan, eq. 23), in metres: how much less exact what is measured at its end will be.
+    """Return LE of a drive (Sujan, eq. 23), in metres: how much less exact measurements at its end will be.
 
         LE = s(Σ') - s(Σ),   s(Σ)² = Σ_xx + Σ_yy + Σ_zz + L² Σ_ψψ
 

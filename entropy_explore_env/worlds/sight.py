@@ -104,7 +104,7 @@ def _visible_to(world: World, scenario: Scenario, kind: RobotKind, starts: _Star
 
 @lru_cache(maxsize=8)
 def _steps(range_: float, shape: tuple[int, int, int]) -> np.ndarray:
-    """(N, 3) int16, all steps within a grid that are at most so long, in voxels, the shortest first."""
+    """Return (N, 3) int16, all steps in a grid that are at most so long, in voxels, the shortest first."""
     farthest = [min(math.floor(range_ + 1e-9), edge - 1) for edge in shape]
     along = [np.arange(-far, far + 1) for far in farthest]
     steps = np.stack(np.meshgrid(*along, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -138,7 +138,7 @@ def _look(left, places, free, steps, found):
 
 @lean_kernel
 def _is_open(free, start, step):
-    """Whether the line from a voxel's centre to that of the voxel a step away crosses free voxels only.
+    """Return whether the line from a voxel's centre to that of one a step away crosses free voxels only.
 
     Crossing times of the faces along axis i are (2 k + 1)/(2 |step_i|), k = 0, 1, …; they are compared as
     whole numbers, and faces that are crossed together are crossed at once.

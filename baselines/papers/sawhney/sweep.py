@@ -55,7 +55,7 @@ _ALL: dict[str, Any] = {
 
 
 def part_of(world: str) -> str:
-    """`plans` or `terrains`."""
+    """Return `plans` or `terrains`."""
     return "plans" if world in PLANS else "terrains"
 
 

@@ -127,7 +127,7 @@ class Sample(NamedTuple):
 
 
 def samples() -> tuple[Sample, Sample]:
-    """Both samples of fig. 7."""
+    """Return both samples of fig. 7."""
     x, y = np.indices((_CELLS, _CELLS)) / _CELLS
     waves = np.sin(2.0 * np.pi * x) * np.cos(2.0 * np.pi * y)
     step = np.where(x < 0.5, 1.0, 0.0)

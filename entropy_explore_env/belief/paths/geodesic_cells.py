@@ -148,7 +148,7 @@ def tessellate(
 
 @lru_cache(maxsize=8)
 def _moves_in_space(strides: tuple[int, int, int]) -> np.ndarray:
-    """(26, 3) int64: offset of each neighbour, number of axes of the step, bits of the moves that it needs.
+    """Return (26, 3) int64: each neighbour's offset, the step's number of axes, bits of the moves it needs.
 
     Moves along one axis come first: these are the ones that others need.
     """

@@ -149,7 +149,7 @@ def _code(step: tuple[int, ...]) -> int:
 
 
 def _footprint(shape: tuple[int, int, int], radius: float, layer: int | None) -> np.ndarray:
-    """(B, 3) int64 index offsets of the voxels that a body touches; none if it touches its own voxel only.
+    """Return (B, 3) int64 index offsets of the voxels that a body touches; none if only its own voxel.
 
     They are in lexicographic order.
     """

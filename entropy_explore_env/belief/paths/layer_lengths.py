@@ -99,7 +99,7 @@ def _free_neighbours(lattice, per_edge, voxel):
 
 @inlined_kernel
 def _steps_onward(arrivals, free):
-    """Bits of the steps onward from a voxel, given those that reached it, and its passable neighbours."""
+    """Return the bits of steps onward from a voxel, by those that reached it and its passable neighbours."""
     onward = 0
     for step in range(_ALL_STEPS):
         if arrivals >> step & 1:

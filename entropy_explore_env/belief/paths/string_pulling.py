@@ -125,7 +125,7 @@ def line_of_sight_cost(search, lattice, costs, start, finish):
 
 @inlined_kernel
 def _stop(lattice, path, number):
-    """(x, y, z) of a stop by its number; planar bodies keep the height of the start."""
+    """Return (x, y, z) of a stop by its number; planar bodies keep the height of the start."""
     if number == 0:
         return path.start[0], path.start[1], path.start[2]
     if number > path.count:
@@ -161,7 +161,7 @@ def _cost_along(search, lattice, costs, path, number):
 
 @lean_kernel
 def _in_sight(search, lattice, costs, path, here, there):
-    """Whether the straight line between two stops is free and costs no more than the path between them."""
+    """Return whether the line between two stops is free and costs no more than the path between them."""
     direct = line_of_sight_cost(
         search, lattice, costs, _stop(lattice, path, here), _stop(lattice, path, there)
     )

@@ -136,7 +136,7 @@ def _part_space(name: str, part: Part) -> spaces.Box:
 
 
 def observation_parts(scenario: Scenario) -> dict[str, Part]:
-    """Shapes and bounds of the parts, one after the other; no array as large as an observation is made."""
+    """Return the parts' shapes and bounds, in order; no array as large as an observation is made."""
     settings, rules = scenario.observation, rules_of(scenario)
     limits: dict[str, tuple[tuple[int, ...], float, np.ndarray]] = {}
     one = np.ones(1)

@@ -145,7 +145,7 @@ def _place(tags: Mapping[int, Any]) -> _Place | None:
 
 
 def _unit_m(keys: Mapping[str, Any], name: str) -> float:
-    """Metres of the unit that the keys state, else of that of the reference system that they state, else 1.
+    """Return the metres of the unit that the keys state, or that their reference system has; else 1.
 
     Args:
         keys: Name of a GeoKey → its value.
@@ -166,7 +166,7 @@ def _unit_m(keys: Mapping[str, Any], name: str) -> float:
 
 
 def _unit_of_system_m(code: int) -> float:
-    """Metres of the unit of a reference system with an EPSG code; 1 where there is no such code."""
+    """Return the metres of the unit of a reference system with an EPSG code; 1 where there is none."""
     if not 0 < code <= _LAST_SYSTEM:
         return 1.0
     try:

@@ -173,7 +173,7 @@ def _corners_of_parts(halvings: int) -> np.ndarray:
 
 
 def _places_on(halvings: int) -> np.ndarray:
-    """(P, 2) shares of its ends in the places on a line that are as far apart as halvings make them."""
+    """Return (P, 2) shares of a line's ends in the places that divide it into 2^halvings equal parts."""
     parts = np.arange((1 << halvings) + 1) / (1 << halvings)
     return np.stack((1.0 - parts, parts), axis=1)
 
@@ -230,7 +230,7 @@ def _halvings(corners: np.ndarray) -> np.ndarray:
 
 
 def _by_area(corners: np.ndarray) -> np.ndarray:
-    """(M,) about how many triangles with no edge too long would cover triangles (M, 3, 3), in voxels."""
+    """Return (M,) about how many triangles with no edge too long would cover triangles (M, 3, 3), voxels."""
     sides = _longest_sides(corners)
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     along, across = 2.0 * _SHARE * sides, 2.0 * _SHARE * areas / np.maximum(sides, 1e-300)

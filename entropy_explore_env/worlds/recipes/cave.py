@@ -51,7 +51,7 @@ def cave(grid: Grid, rng: np.random.Generator) -> World:
 
 
 def _halls(room_m: np.ndarray, narrowest: float, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Centres and semi-axes of halls, (N, axes) metres each; far from each other, inside the room."""
+    """Return halls' centres and semi-axes, (N, axes) metres each; far from each other, inside the room."""
     count = int(np.clip(round(room_m[0] * room_m[1] / _AREA_A_HALL_M2), 3, _MOST_HALLS))
     margin = np.minimum(narrowest + 1.0, 0.5 * room_m)
     centres = [rng.uniform(margin, room_m - margin)]
@@ -80,7 +80,7 @@ def _tunnel_ends(halls: np.ndarray, rng: np.random.Generator) -> list[tuple[int,
 def _tunnel(
     start: np.ndarray, end: np.ndarray, narrowest: float, room_m: np.ndarray, rng: np.random.Generator
 ) -> list[tuple[np.ndarray, float]]:
-    """Points along a winding tunnel, at most half the narrowest radius apart, and the radius at each."""
+    """Return points along a winding tunnel, at most half the narrowest radius apart, and their radii."""
     length = float(np.linalg.norm(end - start))
     steps = max(2, math.ceil(2.5 * length / narrowest))
     share = np.linspace(0.0, 1.0, steps)

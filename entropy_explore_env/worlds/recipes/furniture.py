@@ -88,7 +88,7 @@ def _place(room: Rectangle, kind: Piece, voxel_size_m: float, rng: np.random.Gen
 
 
 def _leaves_passages(box: Rectangle, room: Rectangle, placed: list[Rectangle], passage: int) -> bool:
-    """Whether every gap to a wall is zero or a passage, and every gap to another piece is a passage."""
+    """Return whether gaps to walls are zero or passages, and gaps to other pieces are passages."""
     at_walls = []
     for axis in (0, 1):
         for gap in (box.low[axis] - room.low[axis], room.high[axis] - box.high[axis]):

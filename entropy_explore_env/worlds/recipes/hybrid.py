@@ -57,7 +57,7 @@ def _regions(whole: Rectangle, wall: int, rng: np.random.Generator) -> list[Rect
 
 
 def _free_component(solid: np.ndarray, region: Rectangle, voxel_size_m: float) -> np.ndarray:
-    """(X, Y) bool, the largest component of where a body fits in a region, whose edge counts as wall."""
+    """Return (X, Y) bool, the largest part of where a body fits in a region, whose edge counts as wall."""
     room = np.zeros_like(solid)
     room[region.window] = largest_component(body_room(solid[region.window], voxel_size_m))
     return room

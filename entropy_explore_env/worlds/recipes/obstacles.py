@@ -28,7 +28,7 @@ _OPEN_MIDDLE_M = 3.0
 
 
 def clearance_voxels(voxel_size_m: float) -> float:
-    """Distance between the centres of solid voxels that lets a body pass in any direction, in voxel edges."""
+    """Return how far apart solid voxels' centres let a body pass in any direction, in voxel edges."""
     return 2.0 * BODY_RADIUS_M / voxel_size_m + 2.5
 
 

@@ -108,7 +108,7 @@ def voxels(length_m: float, voxel_size_m: float) -> int:
 
 
 def passage_voxels(width_m: float, voxel_size_m: float, body_radius_m: float = BODY_RADIUS_M) -> int:
-    """Voxels across a passage: at least its width, and at least what the body needs between two walls."""
+    """Return the voxels across a passage: its width at least, and what a body needs between two walls."""
     needed = 2 * max(0, math.ceil(body_radius_m / voxel_size_m - 0.5 - 1e-9)) + 1
     return max(math.ceil(width_m / voxel_size_m - 1e-9), needed)
 
