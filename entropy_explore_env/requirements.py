@@ -30,7 +30,7 @@ def extras() -> dict[str, list[str]]:
 
 
 def pins() -> dict[str, dict[str, str]]:
-    """Extra of the library → the packages of which it takes one version alone, and this version."""
+    """Return, by extra of the library, the packages of which it takes one version alone, and this version."""
     found: dict[str, dict[str, str]] = {}
     for extra, brought in _brought().items():
         for each in brought:
@@ -62,7 +62,7 @@ def version_of(name: str) -> str | None:
 
 
 def _by_extra(distribution: str) -> dict[str | None, list[Requirement]]:
-    """Extra, or None → what a distribution needs for it here; nothing where it is not installed."""
+    """Return, by extra or None, what a distribution needs for it here; nothing where it is not installed."""
     try:
         lines = importlib.metadata.requires(distribution) or []
     except importlib.metadata.PackageNotFoundError:

@@ -232,7 +232,7 @@ def parsed(words: Sequence[str], description: str | None = None) -> Args:
 
 
 def rollout_that_fits(args: Args) -> dict[str, int]:
-    """Missions and steps of a rollout, by default: in a short run at most an eighth of it, if that can be.
+    """Return a rollout's default missions and steps: in a short run an eighth of it at most, if it can be.
 
     Both are halved in turn, down to 8 missions and 16 steps.
     """

@@ -121,7 +121,7 @@ def interpolated_ratio_interval(
 
 
 def paired_p(smaller: np.ndarray, larger: np.ndarray) -> float:
-    """One-sided p of the paired Wilcoxon signed-rank test that the first are smaller; 1 if all are equal."""
+    """Return the one-sided p of Wilcoxon's signed-rank test that the first are smaller; 1 = all are equal."""
     if np.array_equal(smaller, larger):
         return 1.0
     result: Any = stats.wilcoxon(smaller, larger, alternative="less")  # SciPy gives it no type

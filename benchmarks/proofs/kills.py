@@ -85,7 +85,7 @@ def _missions(folder: Path) -> list[bytes]:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Everything that a sweep wrote, except missions, times on the clock and half-written files."""
+    """Return all that a sweep wrote, except missions, times on the clock and half-written files."""
     return {
         str(path.relative_to(folder)): _without_clock(path)
         for path in sorted(folder.rglob("*"))

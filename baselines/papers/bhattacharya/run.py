@@ -103,7 +103,7 @@ def unpacked(text: str) -> dict[str, np.ndarray]:
 
 
 def start_cells(occupied: np.ndarray, starts: str, robots: int, seed: int) -> list[int]:
-    """Free cells for the robots; those of a cluster are 10 cells apart at least."""
+    """Return free cells for the robots; those of a cluster are 10 cells apart at least."""
     free = np.flatnonzero(~occupied.reshape(-1))
     rng = np.random.default_rng((seed, 1))
     if starts == "random":

@@ -148,7 +148,7 @@ def _shared_claims(records: Records) -> list[Claim]:
 
 
 def _unfilled(records: Records, i_min: float) -> np.ndarray:
-    """(4, N) share of two robots' batches that were smaller than burst 64, in each quarter of the scans."""
+    """Return (4, N) shares of two robots' batches smaller than burst 64, in each quarter of the scans."""
     sent = [np.array_split(each["sent_by_scan"], 4) for each in records[team_id(2, STANDARD[0], i_min)]]
     return np.array([[float((part < STANDARD[0]).mean()) for part in parts] for parts in sent]).T
 

@@ -88,7 +88,7 @@ def relative(
     worlds: Sequence[str] = (),
     seeds: slice = _ALL,
 ) -> np.ndarray:
-    """(N,) relative times of a method by world and seed, means over teams; in the same order for all methods.
+    """Return (N,) relative times of a method by world and seed, means over teams; all methods in one order.
 
     Args:
         records: By cell.

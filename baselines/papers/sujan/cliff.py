@@ -79,7 +79,7 @@ def all_claims(records: Records) -> list[Claim]:
 
 
 def answered(records: Records, method: int, steps: int) -> np.ndarray:
-    """(N,) new columns that the looks of some steps showed, over those that they were expected to show."""
+    """Return (N,) new columns that the looks of some steps showed, over those that they were to show."""
     looks = [looks_of(records, method, field, steps).sum(axis=1) for field in ("obtained", "expected")]
     return np.asarray(looks[0] / np.maximum(looks[1], 1.0))
 

@@ -122,13 +122,13 @@ def new_columns(records: Records, method: int) -> np.ndarray:
 
 
 def looks_of(records: Records, method: int, field: str, steps: int) -> np.ndarray:
-    """(N, S) `expected` or `obtained` new columns of the first chosen looks; 0 where there are no more."""
+    """Return (N, S) `expected` or `obtained` new columns of the first chosen looks; 0 where there is none."""
     rows = [np.asarray(record[field], float)[:steps] for record in records[cell_id(method)]]
     return np.stack([np.pad(row, (0, steps - len(row))) for row in rows])
 
 
 def interest_in(records: Records, part: str, steps: int) -> np.ndarray:
-    """(N,) mean interest of method 5 in columns below the cliff, `unreadable` or `readable`, after steps."""
+    """Return method 5's (N,) mean interest in `unreadable` or `readable` columns below, after steps."""
     rows = [record[f"interest_{part}"] for record in records[cell_id(5)]]
     return np.array([row[min(LOOKS + steps, len(row) - 1)] for row in rows])
 

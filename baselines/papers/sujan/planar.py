@@ -144,7 +144,7 @@ def _team_claims(records: Records, robots: int) -> list[Claim]:
 
 
 def by_scan(records: Records, cell: str, field: str, scans: int = SCANS) -> np.ndarray:
-    """(N, scans + 1) a figure of each mission before its first scan and after each; at the end it stays."""
+    """Return (N, scans + 1) a figure of each mission before its first scan and after each; the last stays."""
     rows = [np.asarray(record[field], float)[: scans + 1] for record in records[cell]]
     return np.stack([np.pad(row, (0, scans + 1 - len(row)), mode="edge") for row in rows])
 

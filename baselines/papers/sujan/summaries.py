@@ -158,7 +158,7 @@ def all_claims(records: Records) -> list[Claim]:
 
 
 def figure_of(records: list[Record], figure: str) -> np.ndarray:
-    """(N,) a figure of each mission of a cell: `time`, `bits` a second, `error`, `joint`, `known` or `wrong`.
+    """Return (N,) a figure of a cell's missions: `time`, `bits` a second, `error`, `joint`, `known`, `wrong`.
 
     Those of maps are at the moment that all missions reach; of a mission that ended before, at its end.
     """

@@ -68,12 +68,12 @@ class Options:
         self._asked = {"voxel_size_m"}  # every file can be resampled
 
     def get(self, name: str) -> Any:  # noqa: ANN401 - numbers and flags
-        """Its value; None = not given."""
+        """Return a setting's value; None = not given."""
         self._asked.add(name)
         return self._given.get(name)
 
     def need(self, name: str, kind: str) -> float:
-        """Its value.
+        """Return a setting's value.
 
         Raises:
             SettingError: It is not given.

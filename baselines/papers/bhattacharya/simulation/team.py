@@ -312,7 +312,7 @@ class Simulation:
         return bool(planner.belief.entropy.reshape(-1)[cell] >= TAU)
 
     def _keeps_target(self, planner: Planner, robot: int) -> bool:
-        """Whether a robot keeps its target: not reached, not seen yet if that is the aim, and not blocked."""
+        """Return whether a robot keeps a target: not reached or blocked, nor seen yet if that is the aim."""
         path = self._paths[robot]
         if len(path) == 0 or (self._wants_to_see[robot] and not self._uncertain(planner, int(path[-1]))):
             return False
