@@ -98,8 +98,11 @@ def _voxels(mesh: Any, options: Options, up: str = "z", unit_m: float = 1.0) -> 
     margin = math.ceil(clearance_m / voxel_m - 1e-9)
     check_extent(np.ptp(vertices, axis=0) + (2.0 + 2.0 * margin) * voxel_m, voxel_m, options)
     corners = vertices[np.asarray(mesh.faces)[mesh.unique_faces()]] / voxel_m - 0.5
-    outer = inside and mesh.volume >= 0  # the solid's side, whichever way the triangles are wound
-    solid, low = _surface(_moved_inwards(corners, -1.0 if outer else 1.0))
+    wound_outwards = _volume(corners) >= 0.0
+    moved = _moved(corners, -1.0 if inside and wound_outwards else 1.0)  # the solid's side is the outer one
+    if wound_outwards and not inside:
+        _keep_inside(moved, corners)
+    solid, low = _surface(moved)
     if inside:
         enclosed = np.asarray(ndimage.binary_fill_holes(solid), np.bool_) & ~solid
         if not enclosed.any():
@@ -117,11 +120,27 @@ def _voxels(mesh: Any, options: Options, up: str = "z", unit_m: float = 1.0) -> 
     return Voxels(labels, voxel_m, (x, y, z))
 
 
-def _moved_inwards(corners: np.ndarray, sign: float) -> np.ndarray:
+def _moved(corners: np.ndarray, sign: float) -> np.ndarray:
     """Return triangles (M, 3, 3), voxels, a little smaller and moved against their normals, times a sign."""
     a, b, c = np.moveaxis(corners, 1, 0)
     normals = sign * _unit(np.cross(b - a, c - a))[:, None]
     return corners - _INWARDS * (normals + _unit(corners - corners.mean(axis=1, keepdims=True)))
+
+
+def _keep_inside(moved: np.ndarray, corners: np.ndarray) -> None:
+    """Bring triangles that were moved inwards back where a slope ends in a sharp edge, out of the solid.
+
+    They stay within the box of the triangles as they were, moved inwards, too; along the axes that it has.
+    """
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    thick = high - low > 2.0 * _INWARDS
+    np.clip(moved, np.where(thick, low + _INWARDS, -np.inf), np.where(thick, high - _INWARDS, np.inf), moved)
+
+
+def _volume(corners: np.ndarray) -> float:
+    """Return the volume within triangles (M, 3, 3); below 0 where they are wound inwards."""
+    a, b, c = np.moveaxis(corners - corners[0, 0], 1, 0)
+    return float((np.cross(a, b) * c).sum()) / 6.0
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
