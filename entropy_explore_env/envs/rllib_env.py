@@ -166,7 +166,7 @@ def runner_seed(run: int, runners: int, runner: int, number: int) -> int:
 def endings(
     terminations: Mapping[str, bool], truncations: Mapping[str, bool], over: bool
 ) -> tuple[dict[str, bool], dict[str, bool]]:
-    """Return who is done after a step, in the form that RLlib reads right.
+    """Return which robots are done after a step, in the form that RLlib reads right.
 
     RLlib takes an episode all of whose agents are marked as done one by one for terminated, whatever their
     marks, and does then not bootstrap the values of those that were truncated. Agents that are truncated

@@ -47,7 +47,7 @@ def with_settings(scenario: Scenario, settings: Mapping[str, Any]) -> Scenario:
 def _meant(settings: object, name: str, value: object, known: Sequence[str]) -> str:
     """Return the end of the message about an unknown field: a part that has such a field, or one like it.
 
-    Whoever gives a mapping means a part, and whoever gives another value a field that is none.
+    A mapping is meant for a part, any other value for a field that is not a part.
     """
     parts = [each for each in known if dataclasses.is_dataclass(getattr(settings, each, None))]
     inner = [(part, each.name) for part in parts for each in dataclasses.fields(getattr(settings, part))]

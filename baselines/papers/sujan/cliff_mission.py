@@ -122,7 +122,7 @@ def new_columns(records: Records, method: int) -> np.ndarray:
 
 
 def looks_of(records: Records, method: int, field: str, steps: int) -> np.ndarray:
-    """Return (N, S) `expected` or `obtained` new columns of the first chosen looks; 0 where there is none."""
+    """Return (N, S) `expected` or `obtained` new columns of the first chosen looks; 0 past the last one."""
     rows = [np.asarray(record[field], float)[:steps] for record in records[cell_id(method)]]
     return np.stack([np.pad(row, (0, steps - len(row))) for row in rows])
 

@@ -95,7 +95,7 @@ def read(path: Path, options: Options) -> Voxels:
 
 
 def _heights_m(raw: np.ndarray, tags: Mapping[int, Any], keys: Mapping[str, Any]) -> np.ndarray:
-    """Return (rows, columns) float64 of the raster's samples, NaN where there is none."""
+    """Return the raster's samples in metres, (rows, columns) float64; NaN where one is missing."""
     rows = raw.astype(np.float64)
     stated = str(tags.get(_GDAL_NODATA, "")).strip("\0 \t\r\n")
     if stated:
@@ -166,7 +166,7 @@ def _unit_m(keys: Mapping[str, Any], name: str) -> float:
 
 
 def _unit_of_system_m(code: int) -> float:
-    """Return the metres of the unit of a reference system with an EPSG code; 1 where there is none."""
+    """Return the metres of the unit of a reference system by its EPSG code; 1 if no system has it."""
     if not 0 < code <= _LAST_SYSTEM:
         return 1.0
     try:

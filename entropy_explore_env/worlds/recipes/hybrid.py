@@ -42,7 +42,7 @@ def hybrid(grid: Grid, rng: np.random.Generator) -> World:
 
 
 def _regions(whole: Rectangle, wall: int, rng: np.random.Generator) -> list[Rectangle]:
-    """Return about a half of the plan, and the two quarters of the other half."""
+    """Return one part of about half the plan, and the two parts of the other half."""
     axis = 0 if whole.extent(0) >= whole.extent(1) else 1
     cut = round(whole.extent(axis) * rng.uniform(0.46, 0.54))
     across = round(whole.extent(1 - axis) * rng.uniform(0.46, 0.54))
