@@ -40,7 +40,7 @@ def test_a_step_that_fails_ends_it_and_leaves_the_folder(tmp_path, monkeypatch, 
 
 
 def test_examples_of_packages_that_are_not_there_are_skipped(tmp_path, monkeypatch, capsys):
-    user = User(tmp_path, borrow=True, training_s=1.0)
+    user = User(tmp_path, borrow=True)
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(user.environment)], check=True)
     assert user.can_import("json.decoder") and not user.can_import("json.moon")
     written = (("here", "import json\nopen('ran', 'w').close()"), ("there", "from benchmarl.run import x"))
@@ -53,4 +53,4 @@ def test_examples_of_packages_that_are_not_there_are_skipped(tmp_path, monkeypat
 @pytest.mark.long
 def test_the_first_hour_works(capsys):
     """All but the examples and the site, which tests of their own run."""
-    assert main(["--borrow", "--training-s", "5", "--skip", "examples,site"]) == 0, capsys.readouterr().err
+    assert main(["--borrow", "--skip", "examples,site"]) == 0, capsys.readouterr().err

@@ -30,16 +30,6 @@ def test_links_and_pictures_exist(page):
     assert not [link for link in missing if page.name != "changelog.md"]
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
-def test_commands_exist(page):
-    if "results" in page.parts:  # as they were written, by the commands of then
-        return
-    for module in set(re.findall(r"python -m ([\w.]+)", page.read_text(encoding="utf-8"))):
-        path = ROOT / Path(*module.split("."))
-        outside = module in ("pip", "venv", "pytest")
-        assert outside or path.with_suffix(".py").exists() or (path / "__main__.py").exists(), module
-
-
 def rows_of(text: str) -> list[dict[str, str]]:
     """The rows of all Markdown tables: head of the column → cell."""
     rows, heads = [], []

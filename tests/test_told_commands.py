@@ -1,4 +1,4 @@
-"""Commands in README.md and on the site's pages can be typed: module, options, make's targets are there.
+"""Commands in README.md, CONTRIBUTING.md and on the site can be typed: module, options and targets are there.
 
 Values are not checked; `python -m tests.new_user` runs some of the commands.
 """
@@ -23,7 +23,7 @@ OUTSIDE = ("pip", "pytest", "venv", "tests")
 """Packages whose options are not checked."""
 PAGES = [
     page
-    for page in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md")))
     if not {ROOT / "docs" / "scenarios", ROOT / "docs" / "build"}.intersection(page.parents)
 ]
 _TARGETS = set(re.findall(r"^([a-z][\w-]*):", (ROOT / "Makefile").read_text("utf-8"), flags=re.MULTILINE))

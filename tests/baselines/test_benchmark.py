@@ -257,44 +257,6 @@ def test_the_reference_is_always_there_and_first():
     assert chosen_strategies("gradient", faults) == ("gradient",)
 
 
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["--suite", "plan"],
-        ["--suite", "plans", "--scenarios", "room"],
-        ["--suite", "faults", "--time-limit-s", "3"],
-        ["--scenarios", "rooom"],
-        ["--scenarios", "room,room"],
-        ["--world", "nowhere.bt"],
-        ["--strategies", "magic"],
-        ["--robots", "0"],
-        ["--robots", "2,2"],
-        ["--seeds", "0"],
-        ["--jobs", "0"],
-        ["--time-limit-s", "inf"],
-        ["--wall-limit-s", "nan"],
-        ["--stop-after-s", "-1"],
-        ["--world-scenario", "moon"],
-        ["--rerun", "--since", "HEAD"],
-        ["--since", "nowhere"],
-        ["--archive", "nowhere.jsonl.xz"],
-        ["--out", "pyproject.toml/below"],
-        ["--magic"],
-    ],
-)
-def test_bad_input_is_one_line_before_anything_runs(words, tmp_path, capsys, monkeypatch):
-    def must_not_run(*_: object, **__: object) -> None:
-        raise AssertionError("missions were run")
-
-    monkeypatch.setattr(trials, "run_each", must_not_run)
-    monkeypatch.chdir(ROOT)
-    given = words if "--out" in words else [*words, "--out", str(tmp_path / "out")]
-    assert run_command(benchmark.main, ["--quick", *given]) == 2
-    said = capsys.readouterr()
-    assert not said.out and said.err.startswith("error: ") and said.err.count("\n") == 1
-    assert not (tmp_path / "out" / "own.md").exists()
-
-
 def test_a_settings_file_and_flags_change_what_is_compared(tmp_path, capsys):
     """A scenario of one's own in a file, worlds of two folders with one name, and a flag."""
     pixels = np.full((30, 44), 254, np.uint8)
@@ -323,18 +285,3 @@ def test_a_settings_file_and_flags_change_what_is_compared(tmp_path, capsys):
     assert {row["task"] for row in results["tasks"]} == {"a/plan, 1 robot", "b/plan, 1 robot"}
     page = (tmp_path / "each" / "own.md").read_text()
     assert str(tmp_path) not in page and "--world a/plan.png b/plan.png --robots 1" in page
-
-
-@pytest.mark.parametrize(
-    ("words", "named"),
-    [
-        (["--suite", "plans", "--robot.reach-m", "2"], "robot.reach_m"),
-        (["--settings", "mine.json", "--scenarios", "room"], "scenarios"),
-        (["--scenarios", "room", "--negate"], "negate"),
-    ],
-)
-def test_options_that_contradict_each_other_are_named(words, named, tmp_path, monkeypatch, capsys):
-    (tmp_path / "mine.json").write_text(json.dumps(settings_of(BOX)))
-    monkeypatch.chdir(tmp_path)
-    assert run_command(benchmark.main, [*words, "--out", "out"]) == 2
-    assert capsys.readouterr().err.startswith(f"error: {named} = ") and not (tmp_path / "out").exists()

@@ -128,21 +128,3 @@ def test_the_example_of_behaviour_cloning_learns(written, capsys, monkeypatch):
     left = runpy.run_path(str(ROOT / "docs/examples/behaviour_cloning.py"))
     variance, loss = map(float, capsys.readouterr().out.split())
     assert loss < 0.6 * variance and len(left["actions"]) > 100
-
-
-@pytest.mark.parametrize(
-    ("words", "named"),
-    [
-        ("--missions 0", "missions = 0"),
-        ("--missions-per-file 0", "missions_per_file = 0"),
-        ("--first-seed -1", "first_seed = -1"),
-        ("--strategy unknown", "unknown"),
-        ("--cluster nowhere", "HOST:PORT"),
-        ("--observation.patch-shape 2 2 2", "odd numbers"),
-    ],
-)
-def test_bad_options_are_one_line(words, named, tmp_path, capsys):
-    assert run_command(main, [*words.split(), "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("error: ") and named in said and said.count("\n") == 1
-    assert not (tmp_path / "out").exists()

@@ -22,7 +22,7 @@ from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.reports.mission_record import load_record
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import BOX
-from tests.baselines.ran import FILES, SHORT, check_refused, without_clock
+from tests.baselines.ran import FILES, SHORT, without_clock
 from tests.systems import needs_posix
 
 ROOT = Path(__file__).parents[2]
@@ -105,28 +105,6 @@ def test_the_table_leaves_out_what_means_nothing(command):
 
 
 # --- bad input
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["nowhere"], ["scenario", "nowhere", "box-7x11x5"]),
-        ([""], ["scenario"]),
-        (["box-7x11x5", "--strategy", "dance"], ["strategy", "dance", "gradient"]),
-        (["box-7x11x5", "--frobnicate", "3"], ["--frobnicate"]),
-        (["box-7x11x5", "more"], ["more"]),
-        (["box-7x11x5", "--robots", "two"], ["--robots", "two"]),
-        (["box-7x11x5", "--robots", "0"], ["robots", "0", "1"]),
-        (["box-7x11x5", "--robots", "900", "--json"], ["robots", "900", "at most"]),
-        (["box-7x11x5", "--seed", "-1"], ["seed", "-1"]),
-        (["box-7x11x5", "--sensor.field-of-view-rad", "9", "1"], ["field_of_view_rad", "9"]),
-        (["box-7x11x5", "--voxel-size-m", "0.2"], ["voxel_size_m", "--world"]),
-        (["box-7x11x5", "--world", "missing.bt"], ["world", "missing.bt", "exists"]),
-        (["box-7x11x5", "--world", "plan.pdf"], ["world", "plan.pdf", ".bt"]),
-    ],
-)
-def test_bad_input_is_one_line_and_code_2(words, said, command):
-    check_refused(command(*words), said)
 
 
 # --- as a process

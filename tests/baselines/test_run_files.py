@@ -13,7 +13,7 @@ from PIL import Image
 from baselines import run
 from baselines.cli import mission_outputs as mission_log
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from tests.baselines.ran import FILES, SHORT, check_refused
+from tests.baselines.ran import FILES, SHORT
 
 
 def read_gif(path: Path) -> list[np.ndarray]:
@@ -83,18 +83,6 @@ def test_the_table_says_what_was_written(command, tmp_path, monkeypatch):
     folder = tmp_path / "a long name of a folder that no table may break into two lines" / "results"
     ran = command("box-7x11x5", "--out", str(folder), *SHORT)
     assert ran.code == 0 and f"{folder}/mission.json" in ran.out
-
-
-def test_a_folder_that_cannot_be_made_is_refused_before_the_mission(command, tmp_path, monkeypatch):
-    def must_not_run(*_: object) -> None:
-        raise AssertionError("the mission ran")
-
-    monkeypatch.setattr(run, "run_mission", must_not_run)
-    (tmp_path / "taken").write_text("mine")
-    for out in (tmp_path / "taken", tmp_path / "taken" / "deeper"):
-        check_refused(command("box-7x11x5", "--out", str(out), "--json"), ["out", "taken"])
-    assert [path.name for path in tmp_path.iterdir()] == ["taken"]
-    assert (tmp_path / "taken").read_text() == "mine"
 
 
 def test_an_interrupted_mission_prints_and_writes_nothing(command, tmp_path, monkeypatch):

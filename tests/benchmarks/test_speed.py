@@ -70,23 +70,6 @@ def test_out_writes_the_page(measured, capsys, tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--rounds", "3"], "--rounds"),
-        (["room"], "room"),
-        (["--out"], "--out"),
-        (["--out", "."], "a file in a folder that exists"),
-        (["--out", "no/such/folder/speed.md"], "no/such/folder"),
-    ],
-)
-def test_bad_input_is_one_line_and_code_2(measured, capsys, words, said):
-    measured(HELD)
-    assert run(*words) == 2
-    out, err = capsys.readouterr()
-    assert out == "" and err.count("\n") == 1 and said in err
-
-
-@pytest.mark.parametrize(
     ("module", "package"), [("octomap", "octomap-python"), ("mpe2.simple_spread_v3", "mpe2")]
 )
 def test_missing_peer_names_the_extra(measured, capsys, monkeypatch, module, package):

@@ -41,10 +41,11 @@ def file(where: Path, name: str, days: float, size: int = 10) -> Path:
 
 
 def test_what_is_not_used_for_long_goes(tmp_path):
-    kept = [file(tmp_path, "a.kernel", 89.0), file(tmp_path, "b.part", 0.5), file(tmp_path, "old.txt", 999.0)]
+    days = {"a.kernel": 89.0, "b.part": 0.5, "old.txt": 999.0, "of a clock that jumped.kernel": -1000.0}
+    kept = [file(tmp_path, name, old) for name, old in days.items()]
     gone = [file(tmp_path, "c.kernel", 91.0), file(tmp_path, "d.part", 2.0)]
     remove_old_kernels(tmp_path)
-    assert [path.exists() for path in kept] == [True] * 3
+    assert [path.exists() for path in kept] == [True] * 4
     assert [path.exists() for path in gone] == [False] * 2
 
 

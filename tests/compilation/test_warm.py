@@ -26,19 +26,6 @@ def test_it_says_what_was_compiled(capsys, monkeypatch):
     assert last.startswith("Compiled 4 kernels in ")
 
 
-@pytest.mark.parametrize(
-    "words, message",
-    [
-        (["rom"], "did you mean room"),
-        (["nothing-like-it"], "one of room"),
-        (["room", "--processes", "0"], "processes"),
-    ],
-)
-def test_what_cannot_be_done_is_said(words, message):
-    with pytest.raises(SettingError, match=message):
-        main(words)
-
-
 def test_a_folder_that_cannot_be_written_is_an_error(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "file"))

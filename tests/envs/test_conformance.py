@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from entropy_explore_env import SCENARIOS, SettingError
-from entropy_explore_env.command import BAD_INPUT, run_command
 from entropy_explore_env.envs import conformance
 from entropy_explore_env.envs.conformance import ConformanceError, check_conformance, leaves, require_same
 from entropy_explore_env.settings.changes import with_settings
@@ -125,28 +124,6 @@ def test_the_command_says_what_it_checked(capsys: pytest.CaptureFixture[str]) ->
     assert conformance.main(["box-7x11x5", "--robots", "2", "--steps", "2", "--seed", "5"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert [line.split(":")[0] for line in lines] == [check.__name__ for check in conformance.CHECKS]
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("nowhere",),
-        ("room", "--robots", "0"),
-        ("room", "--robots", "few"),
-        ("room", "--steps", "0"),
-        ("room", "--seed", "-1"),
-        ("room", "--world", "nowhere.bt"),
-        ("room", "--frobnicate"),
-        (),
-    ],
-)
-def test_the_command_refuses_bad_input_in_words(
-    arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert run_command(conformance.main, arguments) == BAD_INPUT
-    said = capsys.readouterr()
-    assert not said.out
-    assert len(said.err.splitlines()) == 1 and said.err.startswith("error: ")
 
 
 def test_the_command_s_results_as_one_object(

@@ -1,6 +1,5 @@
 """What cannot be had is refused with a named error, in one line, before anything changes."""
 
-import pickle
 from collections.abc import Mapping
 from typing import Any
 
@@ -65,13 +64,6 @@ def test_bad_settings_are_named_with_their_value_and_what_is_allowed(
     assert field in str(caught.value)
     assert repr(caught.value.value) in str(caught.value) and caught.value.allowed in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_errors_survive_the_way_back_from_a_worker() -> None:
-    with pytest.raises(SettingError) as caught:
-        parallel_env(BOX, robots=0)
-    again = pickle.loads(pickle.dumps(caught.value))
-    assert type(again) is SettingError and str(again) == str(caught.value)
 
 
 @pytest.mark.parametrize("value", [2, "1", True, 1])

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from entropy_explore_env import SettingError, SingleRobotEnv, World, WorldError, env, parallel_env
+from entropy_explore_env import SettingError, SingleRobotEnv, World, WorldError, parallel_env
+from entropy_explore_env import env as turn_taking_env
 from entropy_explore_env.envs.episodes import leaves, require_same, snapshot
 from entropy_explore_env.envs.robot_vec_env import RobotVecEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
@@ -94,7 +95,7 @@ def test_a_world_number_is_the_world_that_the_recipe_makes_of_it() -> None:
 
 
 def test_the_other_adapters_take_them_too() -> None:
-    turns = env(**BOX)
+    turns = turn_taking_env(**BOX)
     turns.reset(seed=0, options={"starts": STARTS, "world": hut()})
     np.testing.assert_array_equal([turns.view(a).pose for a in turns.possible_agents], STARTS)
     alone = SingleRobotEnv("box-7x11x5")
@@ -186,34 +187,27 @@ REFUSED: list[tuple[Any, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("options", "said"), REFUSED)
-def test_what_cannot_be_is_refused_by_name_and_changes_nothing(options: Any, said: str) -> None:
-    team = parallel_env(**BOX)
-    team.reset(seed=0)
-    before = snapshot(team)
-    with pytest.raises((SettingError, WorldError), match=said):
-        team.reset(seed=1, options=options)
-    require_same("refused", before, snapshot(team))
+REFUSED_FOR_MANY: list[tuple[Any, str]] = [
+    ({"reset_masks": None}, "did you mean reset_mask"),
+    ({"starts": np.stack([STARTS] * 3)}, r"\(2, 5\) or \(2, 2, 5\)"),
+    ({"starts": np.stack([STARTS, changed(1, 1, 0.9)])}, "robot_0"),
+    ({"world": [3]}, "one world, or 2 of them"),
+    ({"world": [3, -3]}, "world = -3"),
+    ({"options": 1}, "only reset_mask, starts, world"),
+]
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ({"reset_masks": None}, "did you mean reset_mask"),
-        ({"starts": np.stack([STARTS] * 3)}, r"\(2, 5\) or \(2, 2, 5\)"),
-        ({"starts": np.stack([STARTS, changed(1, 1, 0.9)])}, "robot_0"),
-        ({"world": [3]}, "one world, or 2 of them"),
-        ({"world": [3, -3]}, "world = -3"),
-        ({"options": 1}, "only reset_mask, starts, world"),
-    ],
+    ("many", "options", "said"),
+    [*((False, *case) for case in REFUSED), *((True, *case) for case in REFUSED_FOR_MANY)],
 )
-def test_vector_environments_refuse_it_too_for_all_missions_or_none(options: Any, said: str) -> None:
-    batch = EntropyExploreVectorEnv(**BOX, num_envs=2)
-    batch.reset(seed=0)
-    before = snapshot(batch)
+def test_what_cannot_be_is_refused_by_name_and_changes_nothing(many: bool, options: Any, said: str) -> None:
+    env = EntropyExploreVectorEnv(**BOX, num_envs=2) if many else parallel_env(**BOX)
+    env.reset(seed=0)
+    before = snapshot(env)
     with pytest.raises((SettingError, WorldError), match=said):
-        batch.reset(seed=1, options=options)
-    require_same("refused", before, snapshot(batch))
+        env.reset(seed=1, options=options)
+    require_same("refused", before, snapshot(env))
 
 
 def test_a_single_robot_s_random_numbers_are_left_alone_by_a_refusal() -> None:

@@ -134,28 +134,24 @@ def test_infos_hold_the_masks_of_discrete_actions_where_they_are_wanted(robots: 
     assert set(infos) - set(without) == {"action_mask", "_action_mask"}
 
 
-@pytest.mark.parametrize(
-    "seed", [[1], [1, 2, 3], [1, -1], -1, 0.5, "12", True, [0, True], [0, 0.5], np.array([0.0, 1.0])]
-)
-def test_bad_seeds_are_refused_and_change_nothing(seed: Any) -> None:
-    env = EntropyExploreVectorEnv(BOX, 2)
-    env.reset(seed=0)
-    before = snapshot(env)
-    with pytest.raises(SettingError, match="seed"):
-        env.reset(seed=seed)
-    require_same("bad seed", before, snapshot(env))
+BAD_SEEDS = [[1], [1, 2, 3], [1, -1], -1, 0.5, "12", True, [0, True], [0, 0.5], np.array([0.0, 1.0])]
+BAD_MASKS = [None, [1, 0], np.array([True]), np.zeros(2, bool), np.ones((2, 1), bool), "10"]
 
 
 @pytest.mark.parametrize(
-    "mask", [None, [1, 0], np.array([True]), np.zeros(2, bool), np.ones((2, 1), bool), "10"]
+    ("said", "given"),
+    [
+        *(("seed", {"seed": seed}) for seed in BAD_SEEDS),
+        *(("reset_mask", {"options": {"reset_mask": mask}}) for mask in BAD_MASKS),
+    ],
 )
-def test_bad_reset_masks_are_refused_and_change_nothing(mask: Any) -> None:
+def test_bad_seeds_and_reset_masks_are_refused_and_change_nothing(said: str, given: dict[str, Any]) -> None:
     env = EntropyExploreVectorEnv(BOX, 2)
     env.reset(seed=0)
     before = snapshot(env)
-    with pytest.raises(SettingError, match="reset_mask"):
-        env.reset(options={"reset_mask": mask})
-    require_same("bad mask", before, snapshot(env))
+    with pytest.raises(SettingError, match=said):
+        env.reset(**given)
+    require_same("refused", before, snapshot(env))
 
 
 def test_calls_before_reset_are_refused() -> None:

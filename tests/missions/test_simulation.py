@@ -156,6 +156,7 @@ def test_a_mission_is_what_the_reference_computes(case):
 
 INVARIANT_CASES = {
     "events": {"robots": 3},
+    "individual": {"robots": 2, "reward": {"kind": "individual"}},
     "period": {"robots": 4, "decision_period_s": 0.75, "world": "furnished"},
     "late": {"robots": 3, "decision_period_s": 0.5, "channel": {"delay_s": 1.3}},
     "lossy": {"robots": 3, "channel": {"loss_probability": 0.4, "range_m": 2.5}},

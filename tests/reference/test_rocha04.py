@@ -11,56 +11,11 @@ from tests.reference import rocha04
 SIZE = (7, 11, 5)
 
 
-def test_a_ray_along_an_axis_crosses_one_voxel_an_edge():
-    traced = rocha04.trace(lambda voxel: False, (1.25, 2.5, 3.5), (0.0, 1.0, 0.0), SIZE, math.inf, 1)
-    assert traced == (8.5, [(1, y, 3) for y in range(2, 11)], rocha04.WALL)
-
-
-def test_a_sloping_ray_enters_voxels_where_it_cuts_their_faces():
-    """From (0.5, 0.5) with slope 1/2: x = 1 at height 0.75, y = 1 at x = 1.5, x = 2, x = 3 and y = 2."""
-    edge = math.sqrt(1.25)
-    pieces = rocha04.pieces_of((0.5, 0.5, 0.5), (1 / edge, 0.5 / edge, 0.0), (3, 11, 1))
-    assert [piece.voxel for piece in pieces] == [(0, 0, 0), (1, 0, 0), (1, 1, 0), (2, 1, 0)]
-    assert [piece.entered for piece in pieces] == pytest.approx([0.0, 0.5 * edge, edge, 1.5 * edge])
-    assert pieces[-1].left == pytest.approx(2.5 * edge)
-
-
 def test_a_voxel_touched_in_a_corner_is_not_crossed():
     half = math.sqrt(0.5)
     pieces = rocha04.pieces_of((0.5, 0.5, 0.5), (half, half, 0.0), (3, 3, 1))
     assert [piece.voxel for piece in pieces] == [(0, 0, 0), (1, 1, 0), (2, 2, 0)]
     assert not rocha04.is_generic((0.5, 0.5, 0.5), (half, half, 0.0), (3, 3, 1), math.inf)
-
-
-def test_a_covered_voxel_ends_a_ray_at_its_face_and_the_voxels_behind_count():
-    for behind, last in ((0, 3), (1, 4), (2, 5), (99, 6)):
-        traced = rocha04.trace(
-            lambda voxel: voxel == (4, 5, 2), (1.5, 5.5, 2.5), (1.0, 0.0, 0.0), SIZE, math.inf, behind
-        )
-        assert traced == (2.5, [(x, 5, 2) for x in range(1, last + 1)], rocha04.HIT)
-
-
-def test_the_voxel_that_a_ray_starts_in_does_not_end_it():
-    traced = rocha04.trace(lambda voxel: True, (1.5, 5.5, 2.5), (-1.0, 0.0, 0.0), SIZE, math.inf, 0)
-    assert traced == (0.5, [(1, 5, 2)], rocha04.HIT)
-
-
-def test_a_ray_ends_open_at_its_range_and_as_a_hit_at_a_measured_distance():
-    ahead = ((1.5, 5.5, 2.5), (1.0, 0.0, 0.0), SIZE, 2.25, 1)
-    assert rocha04.trace(lambda voxel: False, *ahead) == (2.25, [(1, 5, 2), (2, 5, 2), (3, 5, 2)], "open")
-    measured = rocha04.trace(lambda voxel: True, *ahead[:3], 2.25, 1, hit_at_longest=True)
-    assert measured.length == 0.5  # covered voxels stop it; where nothing does, its length is the hit:
-    measured = rocha04.trace(lambda voxel: False, *ahead, hit_at_longest=True)
-    assert measured == (2.25, [(1, 5, 2), (2, 5, 2), (3, 5, 2), (4, 5, 2)], "hit")
-
-
-def test_the_first_point_of_a_ball_on_a_ray():
-    east = (1.0, 0.0, 0.0)
-    assert rocha04.distance_to_ball((0, 0, 0), east, (5, 0, 0), 2.0) == 3.0
-    assert rocha04.distance_to_ball((0, 0, 0), east, (5, 3, 0), 5.0) == pytest.approx(1.0)
-    assert rocha04.distance_to_ball((0, 0, 0), east, (5, 3, 0), 2.9) == math.inf
-    assert rocha04.distance_to_ball((0, 0, 0), east, (-5, 0, 0), 2.0) == math.inf
-    assert rocha04.distance_to_ball((0, 0, 0), east, (1, 0, 0), 2.0) == 0.0
 
 
 def test_figure_1_the_sensor_model_at_60_cm():
@@ -69,14 +24,6 @@ def test_figure_1_the_sensor_model_at_60_cm():
     for distance, mean in expected.items():
         assert rocha04.measured_mean(distance, 0.60, 0.25) == pytest.approx(mean, abs=1e-12)
     assert rocha04.measured_sigma(60.0, 0.08, 0.0005) == pytest.approx(0.11)
-
-
-def test_figure_2_a_measurement_of_one_voxel():
-    mean, sigma = rocha04.product((0.35, 0.075), (0.4, 0.1))
-    assert (round(mean, 3), round(sigma, 3)) == (0.368, 0.06)
-    assert round(rocha04.utility_bits([0.075], [sigma]), 3) == 0.322
-    for one, bits in ((0.075, -1.690), (0.1, -1.275), (0.06, -2.012)):  # the paper prints other ones
-        assert round(rocha04.entropy_bits(one), 3) == bits
 
 
 def test_entropy_is_the_integral_of_equation_14():
@@ -105,52 +52,6 @@ def test_utility_is_the_entropy_that_a_measurement_takes():
     assert beliefs[0, 0, 0][0] == pytest.approx(0.5 * (1 - weight))
     # The hit is 1 m away, the centre of voxel 2 too: it measures ½, as it was before.
     assert beliefs[2, 0, 0][0] == pytest.approx(0.5)
-
-
-UTILITY = [0.5, 2.0, 0.1, 2.0, 1.0]
-
-
-@pytest.mark.parametrize(
-    ("chosen", "burst", "i_min", "valid"),
-    [
-        ([1, 3], 2, 0.3, True),
-        ([3, 1], 2, 0.3, True),  # it is a set
-        ([1, 3, 4, 0], 4, 0.3, True),
-        ([1, 3, 4, 0], 5, 0.3, True),
-        ([1, 3, 4, 0, 2], 5, 0.3, False),  # 0.1 is not worth it
-        ([1, 3, 4], 2, 0.3, False),  # too many
-        ([1, 3], 5, 0.3, False),  # two forgotten
-        ([1, 4], 2, 0.3, False),  # ray 3 says more than ray 4
-        ([1, 1], 2, 0.3, False),  # one of them twice
-        ([1], 1, 0.3, True),
-        ([3], 1, 0.3, True),  # a tie: the paper leaves it open
-        ([], 5, 2.1, True),
-        ([], 5, 2.0, False),
-        ([], 0, 0.0, True),
-    ],
-)
-def test_equation_43(chosen, burst, i_min, valid):
-    assert rocha04.is_valid_selection(UTILITY, chosen, burst, i_min) is valid
-
-
-def test_the_slow_selection_is_in_order_of_utility_and_ties_go_by_number():
-    assert rocha04.select(UTILITY, 3, 0.3) == [1, 3, 4]
-    assert rocha04.select(UTILITY, 9, 0.3) == [1, 3, 4, 0]
-    assert rocha04.select(UTILITY, 0, 0.3) == []
-    for burst in range(7):
-        for i_min in (0.0, 0.1, 0.5, 1.0, 1.5, 2.0, 2.5):
-            chosen = rocha04.select(UTILITY, burst, i_min)
-            assert rocha04.is_valid_selection(UTILITY, chosen, burst, i_min)
-
-
-def stripes(voxel: rocha04.Voxel) -> float:
-    """σ = 2^(x - 2y + 3z): its entropy changes by 1, -2 and 3 bits a voxel along the axes."""
-    return 2.0 ** (voxel[0] - 2 * voxel[1] + 3 * voxel[2])
-
-
-def test_the_gradient_is_a_backward_difference_in_bits_a_metre():
-    assert rocha04.entropy_gradient(stripes, (2, 3, 4), 0.5) == pytest.approx([2.0, -4.0, 6.0])
-    assert rocha04.entropy_gradient(stripes, (0, 3, 0), 0.25) == pytest.approx([0.0, -8.0, 0.0])
 
 
 def test_candidates_are_the_voxels_whose_centres_are_within_reach():

@@ -211,28 +211,6 @@ def test_a_run_is_neither_overwritten_nor_continued_with_other_options(uninterru
     assert "the folder of a run; it has no run.json" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("words", "named"),
-    [
-        (["--scenario", "cellar"], "cellar"),
-        (["--total-steps", "0"], "total_steps"),
-        (["--gamma", "0"], "gamma"),
-        (["--learning-rate", "nan"], "learning_rate"),
-        (["--entropy", "-1"], "entropy"),
-        (["--hidden", "0"], "hidden"),
-        (["--seed", "-1"], "seed"),
-        (["--patch"], "patch"),
-        (["--robots", "0"], "robots"),
-        (["--actions", "mixed"], "actions"),
-    ],
-)
-def test_bad_settings_are_one_line(tmp_path, capsys, words, named):
-    assert learn(tmp_path / "run", *words) == BAD_INPUT
-    said = capsys.readouterr().err.splitlines()
-    assert len(said) == 1 and named in said[0]
-    assert not (tmp_path / "run").exists()
-
-
 @pytest.mark.parametrize("what", ["reward", "weights"])
 def test_what_is_not_finite_stops_the_run_and_leaves_the_last_good_checkpoint(
     tmp_path, capsys, monkeypatch, what

@@ -17,32 +17,6 @@ from training.rllib_ppo import Args, last_checkpoint, main
 from training.validation import Validation
 
 
-@pytest.mark.parametrize(
-    ("words", "named"),
-    [
-        ("--scenario nowhere", "nowhere"),
-        ("--robots 0", "Scenario.robots = 0"),
-        ("--seed -1", "seed = -1"),
-        ("--runners -1", "runners = -1"),
-        ("--total-steps 0", "total_steps = 0"),
-        ("--validation-missions 0", "validation_missions = 0"),
-        ("--minibatch 64 --batch 32", "minibatch = 64: expected at most the batch, 32"),
-        ("--learning-rate nan", "learning_rate = nan"),
-        ("--gamma 1.1", "gamma = 1.1"),
-        ("--entropy -1", "entropy = -1"),
-        ("--hidden 0", "hidden = (0,)"),
-        ("--address somewhere", "HOST:PORT of a Ray cluster"),
-        ("--resume nowhere", "the folder of a run"),
-        ("--no-such-option 1", "no-such-option"),
-    ],
-)
-def test_bad_arguments_are_one_line_and_leave_nothing(words, named, tmp_path, capsys):
-    assert run_command(main, [*words.split(), "--out", str(tmp_path / "run")]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("error: ") and said.count("\n") == 1 and named in said
-    assert not (tmp_path / "run").exists()
-
-
 class Quiet:
     """Stands in for Ray where nothing is trained."""
 

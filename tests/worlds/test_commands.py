@@ -73,25 +73,6 @@ def test_a_world_of_a_number_is_that_of_make_world(tmp_path, capsys):
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["office", "--world-number", "3", "--seed", "1"], "seed = 1: expected no value beside"),
-        (["office", "--world-number", "3", "--seed", "0"], "seed = 0: expected no value beside"),
-        (
-            ["office", "--world-number", "3", "--split", "test"],
-            "split = 'test': expected no value beside",
-        ),
-        (["office", "--world-number", "-3"], "world_number = -3: expected a whole number"),
-        (["FLOOR", "--world-number", "3"], "world_number = 3: expected no value for a file"),
-    ],
-)
-def test_a_seed_and_a_number_exclude_each_other(floor, words, said, capsys):
-    words = ["show", *(word.replace("FLOOR", str(floor)) for word in words)]
-    assert run_command(main, [*words, "--out", str(floor.parent / "world.png")]) == 2
-    assert capsys.readouterr().err.startswith(f"error: {said}")
-
-
 def test_convert_keeps_the_world(tmp_path, capsys):
     (tmp_path / "hills.npz").write_bytes(npz(elevation=heights()))
     words = ["convert", str(tmp_path / "hills.npz"), str(tmp_path / "out.npz")]
@@ -101,29 +82,3 @@ def test_convert_keeps_the_world(tmp_path, capsys):
     assert again.grid == first.grid and again.name == "hills"
     np.testing.assert_array_equal(again.occupied, first.occupied)
     np.testing.assert_array_equal(again.ceiling, first.ceiling)
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        [],
-        ["draw"],
-        ["show", "room-furnished", "--out", "world.jpg"],
-        ["show", "room-furnished", "--out", "world.png", "--voxel-size-m", "0.1"],
-        ["show", "room-furnished", "--out", "world.png", "--seed", "-1"],
-        ["show", "nowhere.bt", "--out", "world.png"],
-        ["show", "castle", "--out", "world.png"],
-        ["convert", "nowhere.bt", "world.bt"],
-        ["show", "FLOOR", "--out", "world.png", "--voxel-size-m", "nan"],
-        ["show", "FLOOR", "--out", "world.png", "--voxel-size-m", "wide"],
-        ["show", "FLOOR", "--out", "FLOOR/world.png"],
-        ["list", "nowhere"],
-    ],
-)
-def test_bad_input_is_one_line(floor, tmp_path, monkeypatch, capsys, words):
-    monkeypatch.chdir(tmp_path)
-    before = sorted(tmp_path.rglob("*"))
-    assert run_command(main, [word.replace("FLOOR", str(floor)) for word in words]) == 2
-    said = capsys.readouterr()
-    assert said.out == "" and said.err.startswith("error: ") and said.err.count("\n") == 1
-    assert sorted(tmp_path.rglob("*")) == before

@@ -1,11 +1,10 @@
-"""Which file is read how: suffixes, settings, and every real world at hand."""
+"""Which file is read how: suffixes, settings, and files that change."""
 
 from __future__ import annotations
 
 import math
 import pickle
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from entropy_explore_env.errors import SettingError, WorldError
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import BOX
 from entropy_explore_env.worlds.files.process import kept_reader
-from entropy_explore_env.worlds.formats import FORMATS
 from entropy_explore_env.worlds.load import (
     load_octomap,
     load_world,
@@ -27,9 +25,6 @@ from entropy_explore_env.worlds.load import (
 )
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box
-
-REAL = Path(__file__).parents[2].parent / "shared" / "worlds"
-FILES = sorted(path for path in REAL.rglob("*") if path.suffix in FORMATS) if REAL.exists() else []
 
 
 @pytest.mark.parametrize("loader", samples())
@@ -194,61 +189,6 @@ def walk(env):
     for _ in range(3):
         each = isinstance(env, EntropyExploreEnv)
         env.step({a: env.action_space(a).sample() for a in env.agents} if each else env.action_space.sample())
-
-
-IGNORED = pytest.mark.filterwarnings("ignore::entropy_explore_env.errors.WorldWarning")
-"""Real plans have grey floors, and unknown that counts as free: that is told."""
-
-
-@IGNORED
-@pytest.mark.skipif(not FILES, reason=f"{REAL} is not here: it is no part of the project")
-def test_every_real_world_loads():
-    with kept_reader():
-        for path in FILES:
-            size_m = 0.2 if FORMATS[path.suffix].reader == "point_clouds" else None  # clouds do not state it
-            assert 0 < load_world(path, voxel_size_m=size_m).occupied.mean() < 1, path
-
-
-def real(name: str) -> Path:
-    """The path of a real world; its test is skipped where the file is not at hand."""
-    path = REAL / name
-    if not path.exists():
-        pytest.skip(f"{path} is not here: it is no part of the project")
-    return path
-
-
-@IGNORED
-@pytest.mark.parametrize(
-    ("name", "shape", "voxel_size_m"),
-    [
-        ("nav2/warehouse.yaml", (1006, 1674, 1), 0.03),
-        ("nav2/depot.yaml", (604, 307, 1), 0.05),
-        ("octomap/geb079.bt", (487, 187, 39), 0.08),
-        ("dungeons/1.png", (640, 480, 1), 0.05),
-    ],
-)
-def test_real_worlds_have_the_size_of_their_files(name, shape, voxel_size_m):
-    grid = load_world(real(name)).grid
-    assert (grid.shape, grid.voxel_size_m) == (shape, pytest.approx(voxel_size_m))
-
-
-def test_the_origin_of_a_real_map_is_its_yaml_file_s():
-    assert load_world(real("nav2/warehouse.yaml")).grid.origin_m == (-15.1, -25.0, 0.0)
-
-
-@IGNORED
-@pytest.mark.parametrize(
-    ("name", "free"),
-    [
-        # floor of the dungeon, and the yellow start; rock is not: counted in the image
-        ("dungeons/1.png", 65024 + 256),
-        # (255 - 205)/255 = 0.196 is below depot's free_thresh: what was never seen is free there
-        ("nav2/depot.yaml", 604 * 307 - 5947),
-        ("nav2/tb3_sandbox.yaml", 7903),
-    ],
-)
-def test_free_cells_of_real_plans(name, free):
-    assert (~load_world(real(name)).occupied).sum() == free
 
 
 def test_a_path_may_be_a_text_and_begin_at_home(tmp_path, monkeypatch):

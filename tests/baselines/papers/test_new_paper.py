@@ -132,25 +132,6 @@ def test_the_command_shows_a_table(new_paper, tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["rocha05"], "paper = 'rocha05': expected one of rocha04"),
-        (["rocha04", "--seeds", "0"], "seeds = 0: expected a whole number"),
-        (["rocha04", "--jobs", "0"], "jobs = 0"),
-        (["rocha04", "--rerun", "--since", "HEAD"], "since = 'HEAD': expected no value"),
-        (["rocha04", "--since", "nothing"], "since = 'nothing': expected a commit"),
-        (["rocha04", "--frobnicate"], "--frobnicate"),
-        (["sawhney", "--seeds", "1"], "seeds = 1: expected a whole number ≥ 2"),
-    ],
-)
-def test_bad_input_is_one_line_and_nothing_is_run(words, said, tmp_path, capsys):
-    assert run_command(main, [*words, "--out", str(tmp_path / "o"), "--runs", str(tmp_path / "r")]) == 2
-    found = capsys.readouterr()
-    assert found.out == "" and found.err.startswith("error: ") and found.err.count("\n") == 1
-    assert said in found.err and not list(tmp_path.rglob("*.jsonl"))
-
-
-@pytest.mark.parametrize(
     ("text", "said"),
     [
         (

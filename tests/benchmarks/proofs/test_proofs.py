@@ -6,11 +6,9 @@ import os
 
 import pytest
 
-from baselines.cli.arguments import run_command
 from benchmarks.proofs import __main__ as command
-from benchmarks.proofs.__main__ import PROOFS, Args, Played, Proof, checked, main, table, write_page
+from benchmarks.proofs.__main__ import PROOFS, Played, Proof, main, table, write_page
 from benchmarks.proofs.cases import Found, play_cases
-from entropy_explore_env.errors import SettingError
 
 
 def squares(number):
@@ -70,26 +68,3 @@ def test_the_page_says_what_each_proof_is(tmp_path):
     text = (tmp_path / "page.md").read_text("utf-8")
     assert all(f"- **{name}**: " in text for name in PROOFS)
     assert len(text.split()) < 1500
-
-
-def test_bad_input_is_refused_before_anything_is_played(tmp_path):
-    (tmp_path / "file").write_text("")
-    for args, said in (
-        (Args(("luck",)), "names = 'luck': expected one of settings, states, determinism"),
-        (Args(cases=0), "cases = 0: expected a whole number ≥ 1"),
-        (Args(cases=5, full=True), "cases = 5: expected no value beside --full"),
-        (Args(first=-1), "first = -1: expected a whole number ≥ 0"),
-        (Args(limit_s=0.0), "limit_s = 0.0: expected a number > 0"),
-        (Args(limit_s=float("nan")), "limit_s = nan"),
-        (Args(out=tmp_path), "a Markdown file, .md, and no folder"),
-        (Args(out=tmp_path / "page.txt"), "a Markdown file, .md, and no folder"),
-        (Args(out=tmp_path / "file" / "page.md"), "a folder that can be made"),
-    ):
-        with pytest.raises(SettingError) as error:
-            checked(args)
-        assert said in str(error.value)
-
-
-def test_what_cannot_be_parsed_is_one_line_and_code_2(capsys):
-    assert run_command(main, ["--cases", "many"]) == 2
-    assert capsys.readouterr().err.count("\n") == 1

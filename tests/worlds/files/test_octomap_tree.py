@@ -1,9 +1,8 @@
-"""OctoMaps: small ones of known voxels, broken files, a real corridor."""
+"""OctoMaps: small ones of known voxels, broken files."""
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from entropy_explore_env.worlds.files.process import kept_reader
 from entropy_explore_env.worlds.files.resampling import resampled
 from entropy_explore_env.worlds.files.voxels import Voxels
 from entropy_explore_env.worlds.load import load_octomap, load_world
-from tests.reference.scenes import free_box
 from tests.worlds.trees import building, write_tree
 
 octomap = pytest.importorskip("octomap", reason="octomap-python is not installed")
@@ -26,7 +24,6 @@ SHAPE = (7, 11, 5)
 EDGE_M = 0.2
 LOW = np.array([-4, 3, -2])
 """Lower corner of the written voxels, in voxels from the map's origin."""
-CORRIDOR = Path(__file__).parents[3].parent / "shared" / "worlds" / "octomap" / "geb079.bt"
 
 
 def write(path, labels, edge_m=EDGE_M, low=LOW):
@@ -264,16 +261,3 @@ def test_a_map_without_free_space_is_refused(tmp_path):
     path = write(tmp_path / "solid.bt", np.full(SHAPE, SOLID))
     assert "free space" in refused(path).allowed
     assert "free space" in refused(path, 0.3).allowed
-
-
-@pytest.mark.skipif(not CORRIDOR.exists(), reason=f"{CORRIDOR} is not here: it is no part of the project")
-def test_a_real_corridor():
-    """Building 079, Freiburg: about 39 × 15 × 3 m, at 0.4 m a few thousand voxels of free space."""
-    world = load_octomap(CORRIDOR, 0.4)
-    assert world.grid.size_m == pytest.approx([39.0, 15.0, 3.1], rel=0.2)
-    assert world.occupied.dtype == np.bool_
-    free = (~world.occupied).sum() * 0.4**3
-    assert 50.0 < free < 1000.0  # m³
-    starts = world.layout(free_box(grid=world.grid)).starts
-    assert len(starts) > 0.3 * (~world.occupied).sum()
-    assert not world.occupied.ravel()[starts].any()

@@ -11,14 +11,10 @@ import numpy as np
 import pytest
 
 from baselines.experiments.claims import Claim, told
-from baselines.experiments.mission import mission_record, scripted
 from baselines.experiments.rows import Record
 from baselines.papers.rocha04 import EXPERIMENT
 from baselines.papers.rocha04.claims import all_claims
 from baselines.papers.rocha04.sweep import TEAMS, team_id
-from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.settings.changes import with_settings
-from entropy_explore_env.settings.scenarios import ROOM
 from tests.baselines.papers.pages import cells_of
 
 
@@ -150,17 +146,3 @@ def test_a_small_sample_s_interval_decides_for_the_single_robot():
         for record, off in zip(records["single"], spread, strict=True):
             record["t_mission_s"] = mean_s + off
         assert claims_of(records)["single-t_mission"].holds == holds
-
-
-def test_the_exact_claims_hold_in_the_real_room():
-    """H(0), H_th and 128 measurements a batch, in one start's mission."""
-    env = EntropyExploreEnv(scripted(with_settings(ROOM, {"robots": 1})))
-    mission = mission_record(env, "gradient", 0)
-    records = {cell.id: [mission, mission] for cell in cells_of(EXPERIMENT, 2, quick=True).values()}
-    claims = claims_of(records)
-    for name in ("H0", "H_th", "batch"):
-        assert claims[name].holds, claims[name]
-    assert claims["H0"].ours == pytest.approx(1.987e5, rel=1e-3)
-    assert claims["H_th"].ours == pytest.approx(-8.6068e4, rel=1e-5)
-    assert mission["finished"] and mission["measurements"] == 128 * mission["scans"]
-    assert claims["team-size-64-0.3219"].ours == 1.0 and not claims["team-size-64-0.3219"].holds

@@ -85,19 +85,6 @@ def test_the_choice_is_that_of_the_equations_up_to_the_edge_of_reach(size, seed,
     assert rocha04.gaze(*found[1]) == pytest.approx(choice.gaze, abs=2e-4)
 
 
-@pytest.mark.parametrize(
-    "offset", [(2, 0, 0), (-2, 0, 0), (0, 2, 0), (0, -2, 0), (0, 0, 2), (0, 0, -2), (1, -2, 2)]
-)
-def test_a_voxel_at_the_edge_of_reach_is_a_candidate_and_one_beyond_is_not(offset):
-    target = tuple(int(at + step) for at, step in zip(MIDDLE, offset, strict=True))
-    field, away = peak(target), math.hypot(*offset)
-    for reach in (away, away * (1 - 1e-7), away + 0.3):
-        found = steepest(*field, MIDDLE, reach)
-        assert found is not None and found[0] == target
-    found = steepest(*field, MIDDLE, away * (1 - 1e-3))
-    assert found is None or found[0] != target
-
-
 @pytest.mark.parametrize("reach", [1.0, 2.0, 3.2, 20.0])
 @pytest.mark.parametrize("along", [(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 2.0), (1.0, 1.0, -1.0)])
 def test_of_equal_voxels_the_first_in_c_order_is_taken(reach, along):
@@ -215,28 +202,6 @@ def test_free_robots_take_the_field_and_planar_ones_its_projection_unless_told()
         assert expected is not None
         assert np.floor(viewpoint[:2] / 0.5).tolist() == list(expected[0][:2])
         assert viewpoint[3] == pytest.approx(expected[1][0])
-
-
-@pytest.mark.parametrize("motion_plane", [None, False])
-@pytest.mark.parametrize("changes", [{"robot": {"motion": "planar"}}, {"grid": Grid((9, 6, 1), 0.5)}])
-def test_planar_robots_stay_level_and_in_their_plane(changes, motion_plane):
-    missions = started(free_box(robots=2, **changes), seed=1)
-    strategy = GradientStrategy(motion_plane)
-    strategy.reset(missions.scenario, np.random.default_rng(0))
-    height = missions.state.robots[0]["goal"][0, 2]
-    steep = 0
-    for _ in range(40):
-        boxes = np.zeros((1, 2, 3))
-        for robot in np.flatnonzero(missions.state.robots[0]["deciding"]):
-            view = view_of(missions, 0, int(robot))
-            viewpoint = strategy.choose(view)
-            assert (viewpoint[2], viewpoint[4]) == (height, 0.0)
-            steep += view.move_end is MoveEnd.ARRIVED
-            boxes[0, robot] = view.action_for(viewpoint)
-        missions.step(boxes, np.zeros((1, 2), np.int64))
-    assert steep > 20
-    assert (missions.state.robots[0]["goal"][:, 2] == height).all()
-    assert (missions.state.robots[0]["goal"][:, 4] == 0.0).all()
 
 
 def test_what_a_robot_cannot_know_does_not_change_its_choice():
