@@ -53,8 +53,6 @@ _BUCKETS_PER_STEP_TO_GOAL = 4.0
 """Buckets per cheapest step where there is a goal: fewer voxels are expanded twice."""
 
 _SQRT2, _SQRT3 = DIAGONALS[1], DIAGONALS[2]
-_LAYER_MOVES = 8
-"""Moves of a search in one layer."""
 
 
 class _Query(NamedTuple):
@@ -116,24 +114,28 @@ def start_search(search, lattice, costs, sources):
 
 
 @inlined_kernel
-def _passable_moves(search, lattice, costs, voxel, x, y, z):
-    """Bits, by number of a move, of the passable neighbours; classifies those that are not classified yet."""
+def _bits(mark, number, k):
+    """Return bit k thrice, where the voxel of a mark is passable; is not classified; has its final cost."""
+    final = np.int64(mark & STEP != 0) & np.int64(mark & OPEN == 0)
+    return np.int64(mark & KIND != IMPASSABLE) << k, np.int64(mark >> SEARCH_SHIFT != number) << k, final << k
+
+
+@inlined_kernel
+def _neighbours(search, lattice, costs, voxel, x, y, z):
+    """Return bits, by number of a move, of the passable neighbours, and of those whose cost is final.
+
+    Neighbours that are not classified yet are classified.
+    """
     size, moves, marks, number = lattice.size, lattice.moves, search.mark, search.searches[0]
-    passable, unclassified = 0, 0
-    inner = 0 < x < size[0] - 1 and 0 < y < size[1] - 1 and lattice.layer >= 0
-    if inner and len(moves) == _LAYER_MOVES:
-        for k in range(_LAYER_MOVES):  # a constant, so that the compiler unrolls the loop
-            mark = np.int64(marks[voxel + moves[k].offset])
-            passable |= np.int64(mark & KIND != IMPASSABLE) << k
-            unclassified |= np.int64(mark >> SEARCH_SHIFT != number) << k
-    else:
-        for k in range(len(moves)):
-            step = moves[k].step
-            at = (x + step[0], y + step[1], z + step[2])
-            if 0 <= at[0] < size[0] and 0 <= at[1] < size[1] and 0 <= at[2] < size[2]:
-                mark = np.int64(marks[voxel + moves[k].offset])
-                passable |= np.int64(mark & KIND != IMPASSABLE) << k
-                unclassified |= np.int64(mark >> SEARCH_SHIFT != number) << k
+    passable, unclassified, settled = 0, 0, 0
+    inner = 0 < x < size[0] - 1 and 0 < y < size[1] - 1 and (lattice.layer >= 0 or 0 < z < size[2] - 1)
+    for k in range(len(moves)):
+        step = moves[k].step
+        x_to, y_to, z_to = x + step[0], y + step[1], z + step[2]
+        if inner or (0 <= x_to < size[0] and 0 <= y_to < size[1] and 0 <= z_to < size[2]):
+            bits = _bits(np.int64(marks[voxel + moves[k].offset]), number, k)
+            passable, unclassified, settled = passable | bits[0], unclassified | bits[1], settled | bits[2]
+    settled &= ~unclassified
     mark, k = np.int64(marks[voxel]), 0
     # Where the body fits here, only what it newly touches has to be checked.
     fits = mark & KIND != IMPASSABLE and not mark & TIGHT
@@ -149,11 +151,11 @@ def _passable_moves(search, lattice, costs, voxel, x, y, z):
                 kind = mark_of(search, lattice, costs, near, at[0], at[1], at[2]) & KIND
             passable = passable & ~(1 << k) | np.int64(kind != IMPASSABLE) << k
         k += 1
-    return passable
+    return passable, settled
 
 
 @inlined_kernel
-def _relax_neighbours(search, lattice, costs, voxel, at, passable, query, max_cost):
+def _relax_neighbours(search, lattice, costs, voxel, at, neighbours, query, max_cost):
     """Reach the neighbours of a voxel, at indices (x, y, z), through it where that is cheaper.
 
     Returns:
@@ -161,13 +163,18 @@ def _relax_neighbours(search, lattice, costs, voxel, at, passable, query, max_co
     """
     marks, cost, number = search.mark, search.cost, search.searches[0]
     here, per_edge = cost[voxel], cost_per_edge(costs, voxel, np.int64(marks[voxel]))
-    for move in lattice.moves:
+    passable, settled = neighbours
+    left = passable
+    if query.goal == ANY_GOAL:
+        left &= ~settled  # their costs are final, since no step is shorter than a bucket
+    for k in range(len(lattice.moves)):
+        if not left >> k & 1:
+            continue
+        move = lattice.moves[k]
         if passable & move.needs != move.needs:
             continue
         near = voxel + move.offset
         mark = np.int64(marks[near])
-        if query.goal == ANY_GOAL and mark & STEP and not mark & OPEN:
-            continue  # popped before: its cost is final, since no step is shorter than a bucket
         there = here + 0.5 * move.length * (per_edge + cost_per_edge(costs, near, mark))
         before = math.inf
         if mark & STEP:
@@ -217,8 +224,8 @@ def _expand_block(search, lattice, costs, query, max_cost):
         marks[voxel] = np.uint32(mark ^ OPEN)
         if key >= max_cost:
             continue
-        passable = _passable_moves(search, lattice, costs, voxel, x, y, z)
-        max_cost = _relax_neighbours(search, lattice, costs, voxel, (x, y, z), passable, query, max_cost)
+        neighbours = _neighbours(search, lattice, costs, voxel, x, y, z)
+        max_cost = _relax_neighbours(search, lattice, costs, voxel, (x, y, z), neighbours, query, max_cost)
     free_block(queue, block)
     return max_cost
 
