@@ -23,7 +23,7 @@ OCCUPIED_BELOW = 0.25
 ROUNDING = 1e-9
 """Where voxels are resampled, one is free if at least so much of its volume is known to be free and less than
 so much is solid; sums of volumes are compared with this slack, as a share of a voxel."""
-MAX_FILE_BYTES = 256 << 20
+MAX_FILE_BYTES = 1 << 30
 MAX_FILE_VOXELS = 130_000_000
 """Voxels of one file, at its own resolution or at the one asked for."""
 MAX_PIXELS = 1 << 29
