@@ -258,14 +258,14 @@ def show(compared: dict[str, Any]) -> None:
         short = (cell.partition(" of ")[0].replace(" (", "\n(") for cell in (median, *others))
         rows.append([names[name], *short])
     print(terminal_table(["strategy", "mission time", "finished", "scans", "ratio", "faster"], rows))
-    print("mission time: median; ratio: the policy's median over the strategy's (95 % intervals);")
-    print("faster: starts on which the policy was faster")
+    print("mission time: median; ratio: the policy's median over the strategy's; 95 %")
+    print("intervals; faster: starts on which the policy was faster")
     there = {row["strategy"] for row in compared["rows"]}
     simple = [name for name in SIMPLE if name in there]
     if len(simple) > 1:
         print(
-            f"better one of {' and '.join(simple)}: {compared['better_rival']}; "
-            f"faster than all of them in the table: on {compared['faster_than_simple']} of {seeds} starts"
+            f"better one of {' and '.join(simple)}: {compared['better_rival']};\n"
+            f"faster than both: on {compared['faster_than_simple']} of {seeds} starts"
         )
 
 

@@ -24,6 +24,11 @@ def test_rows_become_markdown_as_they_are():
     assert wide[2:] == ["| 1,234.50 |  |", "|   x | 1e5 |"]
 
 
+def test_a_table_for_the_terminal_keeps_the_lines_of_its_cells():
+    lines = terminal_table(["a", "b"], [["42 s\n(39 … 44)", 1]]).splitlines()
+    assert [line.split() for line in lines[2:]] == [["42", "s", "1"], ["(39", "…", "44)"]]
+
+
 def test_a_table_for_the_terminal_wraps_texts_and_leaves_numbers_as_they_are():
     lines = terminal_table(["a", "b"], [["198,700", "x y z"], [1, "1,204 (1,138 … 1,274)"]], 12).splitlines()
     assert [line.split() for line in lines] == [
