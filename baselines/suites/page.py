@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -177,24 +177,28 @@ _TASK_COLUMNS = {
     "map_error": ("map error", ".3f"),
 }
 """Figure of a task → head of its column, and format."""
+_TEAM_COLUMNS = {"balance": ("imbalance", ".2f"), "bits_sent": ("bits sent", ",.0f")}
+"""The same, where there is a team."""
 
 
 def tasks_table(results: Results) -> str:
     """Return the table of tasks: of each what it is, and a row a strategy with medians over missions."""
     measures = results.suite.measures
     head = ["strategy", "finished", *(measure.words for measure in measures), f"over `{results.reference}`"]
-    head += [words for words, _ in _TASK_COLUMNS.values()]
+    teams = any(task.scenario.robots > 1 for task in results.tasks)
+    columns = _TASK_COLUMNS | (_TEAM_COLUMNS if teams else {})
+    head += [words for words, _ in columns.values()]
     first, parts = measures[0].name, []
     all_rows = sorted(task_rows(results), key=lambda row: row[first])
     names = shown_names({row["strategy"] for row in all_rows})
     for task in results.tasks:
         rows = [row for row in all_rows if row["task"] == task.name]
-        cells = [[f"`{names[row['strategy']]}`", *_task_cells(row, measures)] for row in rows]
+        cells = [[f"`{names[row['strategy']]}`", *_task_cells(row, measures, columns)] for row in rows]
         parts.append(f"**{task.name}**: {about(task)}\n\n{markdown_table(head, cells)}")
     return "\n".join(parts)
 
 
-def _task_cells(row: Row, measures: Sequence[Measure]) -> list[str]:
+def _task_cells(row: Row, measures: Sequence[Measure], columns: Mapping[str, tuple[str, str]]) -> list[str]:
     finished = f"{row['finished']} of {row['missions']}" + (
         f", {row['failed']} failed" if row["failed"] else ""
     )
@@ -204,7 +208,7 @@ def _task_cells(row: Row, measures: Sequence[Measure]) -> list[str]:
         cut = row[measure.name].value >= limit
         cells.append(f"> {limit:,.0f}" if cut else shown(row[measure.name], ",.0f"))
     cells.append(shown(row[f"{measures[0].name}_ratio"], ".2f"))
-    figures = ((row[name], form) for name, (_, form) in _TASK_COLUMNS.items())
+    figures = ((row[name], form) for name, (_, form) in columns.items())
     return cells + ["-" if value is None else format(value, form) for value, form in figures]
 
 

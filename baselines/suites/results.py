@@ -28,6 +28,8 @@ MARKS = (
     *(Measure("time_s", share, "bits") for share in (50, 90, 99)),
 )
 """What is told of every task beside the suite's measures."""
+_TEAM = ("scans", "distance_m", "balance", "bits_sent")
+"""Columns that are figures of the team."""
 _JOINT = {"explored": "explored", "map_error": "error", "wrong": "wrong"}
 """Column → figure of the joint map."""
 _LEAST = 1e-3
@@ -261,7 +263,7 @@ def _task_row(results: Results, task: Task, strategy: str) -> Row:
         row[f"{measure.name}_limit"] = measure.limit(task.scenario)
         row[f"{measure.name}_ratio"] = results.ratio(strategy, results.reference, measure, [task])
     row |= {f"median_{mark.name}": _median(map(mark.value, records), len(records)) for mark in MARKS}
-    row |= {name: _median((each.get(name) for each in records), 0) for name in ("scans", "distance_m")}
+    row |= {name: _median((each.get(name) for each in records), 0) for name in _TEAM}
     joint = [record.get("joint", {}) for record in records]
     row |= {name: _median((each.get(figure) for each in joint), 0) for name, figure in _JOINT.items()}
     return row | _clock(records)
