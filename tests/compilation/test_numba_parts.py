@@ -44,27 +44,12 @@ def test_what_is_called_takes_what_it_is_given():
         return list(inspect.signature(function).parameters)
 
     assert parameters(CPUDispatcher.__init__)[1:] == ["py_func", "locals", "targetoptions", "pipeline_class"]
-    assert parameters(compiler.CompileResult._rebuild)[1:] == [
-        "libdata",
-        "fndesc",
-        "env",
-        "signature",
-        "objectmode",
-        "lifted",
-        "typeann",
-        "reload_init",
-        "referenced_envs",
-    ]
+    rebuilt = "libdata fndesc env signature objectmode lifted typeann reload_init referenced_envs".split()
+    assert parameters(compiler.CompileResult._rebuild)[1:] == rebuilt
     assert parameters(CPUDispatcher.compile) == ["self", "sig"]
     assert parameters(CPUDispatcher.get_call_template) == ["self", "args", "kws"]
-    assert parameters(type_inference_stage)[:6] == [
-        "typingctx",
-        "targetctx",
-        "interp",
-        "args",
-        "return_type",
-        "locals",
-    ]
+    inferred = ["typingctx", "targetctx", "interp", "args", "return_type", "locals"]
+    assert parameters(type_inference_stage)[:6] == inferred
 
 
 def test_settings_of_numba_that_change_code_are_known():

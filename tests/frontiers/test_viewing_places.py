@@ -40,11 +40,11 @@ def number(plan, place):
 
 def crossed(first, second):
     """The cells strictly between two that the line between their centres leads through the inside of."""
-    far = max(abs(b - a) for a, b in zip(first, second, strict=True))
-    shares = (np.arange(4000 * max(far, 1)) + 0.5) / (4000 * max(far, 1))
+    x, y = np.abs(np.subtract(second, first)).tolist()
+    count = 8 * max(x, 1) * max(y, 1)  # faces are met at least 1/(2xy) of the line apart
+    shares = (np.arange(count) + 0.5) / count
     points = np.array(first) + 0.5 + shares[:, None] * (np.array(second) - np.array(first))
-    cells = {tuple(int(i) for i in place) for place in np.floor(points)}
-    return cells - {tuple(first), tuple(second)}
+    return {*map(tuple, np.floor(points).astype(int).tolist())} - {tuple(first), tuple(second)}
 
 
 def through_a_corner(first, second):

@@ -10,33 +10,19 @@ from entropy_explore_env.missions.endings import IDLE_ROUNDS, IDLE_SCANS
 from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.reset_options import ResetOptions
 from entropy_explore_env.missions.simulation import Missions
-from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import SCENARIOS
-from entropy_explore_env.worlds.given import in_given_worlds
 from entropy_explore_env.worlds.world import World
+from tests.worlds.test_sight import EDGE_M, LEFT, asked, two_rooms
 
-EDGE_M, WIDE, DEEP = 0.1, 23, 9
-EDGES_M = EDGE_M * (WIDE + DEEP + 1)
-STARTS = np.array([[0.35, 0.25, 0.05, 0.0, 0.0], [0.35, 0.65, 0.05, 0.0, 0.0]])
-
-
-def two_rooms():
-    """A world of two rooms; through the gap between them fits a beam, and no body."""
-    solid = np.zeros((WIDE, DEEP, 1), bool)
-    solid[12] = True
-    solid[12, 4] = False
-    return World(Grid(solid.shape, EDGE_M), solid, "rooms")
+EDGES_M = EDGE_M * (23 + 9 + 1)
 
 
 def rooms(**settings):
-    """Two robots in the left one of two rooms."""
-    world = two_rooms()
-    changes = {"robots": 2, "robot": {"body_radius_m": 0.14}, "ending": {"seen_share": 1.0}}
-    missions = Missions(
-        in_given_worlds(with_settings(SCENARIOS["office"], {**changes, **settings}), [world]), given=(world,)
-    )
-    missions.reset(0, seed=0, options=ResetOptions(STARTS))
+    """Two robots in the left one of two rooms; through the gap between them fits a beam, and no body."""
+    world = two_rooms(1)
+    missions = Missions(asked(world, 0.14, **settings), given=(world,))
+    missions.reset(0, seed=0, options=ResetOptions(LEFT))
     return missions
 
 
@@ -54,7 +40,7 @@ def know(missions, robot):
 
 
 def test_what_can_be_driven_up_to_is_the_own_room_and_its_walls():
-    drivable = rooms().state.drivable[0].reshape(WIDE, DEEP)
+    drivable = rooms().state.drivable[0].reshape(23, 9)
     assert drivable[:12].all() and not drivable[13:].any()
 
 
@@ -129,7 +115,7 @@ def test_strategies_end_in_front_of_a_gap_that_beams_pass(strategy):
     solid[40] = True
     solid[40, 28:31] = False
     settings = {"robot": {"body_radius_m": 0.25}, "ending": {"seen_share": 0.99, "time_limit_s": 1500.0}}
-    world, starts = World(Grid(solid.shape, 0.1), solid, "gap"), STARTS.copy()
+    world, starts = World(Grid(solid.shape, 0.1), solid, "gap"), LEFT.copy()
     starts[:, :2] = [[1.0, 1.0], [1.0, 1.8]]
     env = scripted_env(SCENARIOS["office"], world=world, robots=2, **settings)
     run_mission(env, make_strategy(strategy), 0, options={"starts": starts})
@@ -138,9 +124,9 @@ def test_strategies_end_in_front_of_a_gap_that_beams_pass(strategy):
 
 def test_an_environment_cuts_the_mission_off_and_says_why():
     env = EntropyExploreEnv(
-        "office", world=two_rooms(), robots=1, robot={"body_radius_m": 0.14}, ending={"seen_share": 1.0}
+        "office", world=two_rooms(1), robots=1, robot={"body_radius_m": 0.14}, ending={"seen_share": 1.0}
     )
-    env.reset(seed=0, options={"starts": STARTS[:1]})
+    env.reset(seed=0, options={"starts": LEFT[:1]})
     for step in range(400):  # to and fro along the wall
         to = np.array([0.0, 0.13 if step % 2 == 0 else -0.13, 0.0], np.float32)
         _, _, terminated, truncated, infos = env.step({"robot_0": to})

@@ -76,10 +76,7 @@ def test_a_byte_is_done_as_soon_as_an_interval_is_shorter_than_its_place(before,
         begin_writing(coder, FIRST, True)
     record = coder.record[0]
     record["range"], done = before, record["place"] + record["waiting"]
-    if reads:
-        code_bit(coder, 0, 0)
-    else:
-        code_bit(coder, 0, 0)
+    code_bit(coder, 0, 0)
     assert record["range"] == after
     assert record["place"] + record["waiting"] - done == int(after > 1 << 24)
 

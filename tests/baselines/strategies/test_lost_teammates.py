@@ -16,6 +16,7 @@ from entropy_explore_env.settings.scenarios import OFFICE
 from entropy_explore_env.worlds.world import World
 
 GRID = Grid((61, 87, 1), 0.1)
+STARTS = [[1.0, 1.0, 0.05, 0.0, 0.0], [3.0, 2.0, 0.05, 1.5, 0.0], [5.0, 1.0, 0.05, 2.0, 0.0]]
 LIMIT_S, STILL_S = 400.0, 60.0
 FAULTS = {
     "stopped": {"stop": {"at_s": 3.0, "robots": (1,)}},
@@ -62,8 +63,7 @@ def ended(strategy: str, fault: str) -> tuple[MissionEnd, float]:
         places[active], since[active] = robots["origin"][active, :3], time_s
         longest = max(longest, float((time_s - since).max()))
 
-    starts = [[1.0, 1.0, 0.05, 0.0, 0.0], [3.0, 2.0, 0.05, 1.5, 0.0], [5.0, 1.0, 0.05, 2.0, 0.0]]
-    run_mission(env, make_strategy(strategy), 1, note, options={"world": two_rooms(), "starts": starts})
+    run_mission(env, make_strategy(strategy), 1, note, options={"world": two_rooms(), "starts": STARTS})
     return env.missions.over(0), longest
 
 
@@ -100,12 +100,11 @@ def test_nothing_is_left_to_teammates_whose_scans_do_not_come(strategy):
             "sensor": {"max_range_m": 3.0},
         }
         env, places = EntropyExploreEnv(with_settings(scripted(OFFICE), settings)), []
-        starts = [[1.0, 1.0, 0.05, 0.0, 0.0], [3.0, 2.0, 0.05, 1.5, 0.0], [5.0, 1.0, 0.05, 2.0, 0.0]]
 
         def note(env: EntropyExploreEnv, places: list = places) -> None:
             places.append(env.missions.state.robots[0]["origin"].copy())
 
-        run_mission(env, make_strategy(strategy), 1, note, options={"world": two_rooms(), "starts": starts})
+        run_mission(env, make_strategy(strategy), 1, note, options={"world": two_rooms(), "starts": STARTS})
         went.append(np.array(places))
     np.testing.assert_array_equal(went[0], went[1])
     assert not np.array_equal(went[0], went[2])

@@ -1,29 +1,12 @@
-"""Shared maps: what summaries of maps come to, claims, page."""
+"""Shared maps: claims, page."""
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 
 from baselines.papers.sujan import sharing
 from baselines.papers.sujan.sharing import MAKERS, THRESHOLDS_BITS, all_claims
-from entropy_explore_env.errors import RecordError
-from entropy_explore_env.robots.map_summary import encode_map, tree_bits
 from tests.baselines.papers.pages import run_paper
-
-
-def test_bits_of_a_tree_are_two_a_node_and_sixteen_a_leaf():
-    rng = np.random.default_rng(0)
-    mean, precision = rng.random((7, 11, 5), np.float32), np.full((7, 11, 5), 9.0, np.float32)
-    data = encode_map(mean, precision, 0.0)
-    nodes, rest = divmod(tree_bits(data, mean.shape) - 16 * mean.size, 2)  # all voxels differ: a leaf each
-    assert rest == 0 and mean.size < nodes < 2 * mean.size
-    assert tree_bits(encode_map(mean, precision, 5.0), mean.shape) == 2 + 16  # one node, one leaf
-    for broken in (b"", b"nonsense", data[:-3], 7, b"EEMS\x02" + data[5:]):
-        with pytest.raises(RecordError, match="map summary"):
-            tree_bits(broken, mean.shape)  # type: ignore[arg-type]
-    with pytest.raises(RecordError, match="map summary"):
-        tree_bits(data, (11, 7, 5))
 
 
 def test_claims_by_hand():

@@ -191,7 +191,7 @@ def test_in_space_each_call_gains_or_moves(name):
     assert (joint_figures(env.missions, 0)["explored"] or 0.0) > 0.5
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, "next-best-view", "raster"])
 def test_a_world_under_an_exposure_surface_is_refused_with_the_reason(name):
     env = EntropyExploreEnv(with_settings(scripted(find_scenario("terrain")), {"robots": 1}))
     with pytest.raises(SettingError, match=f"{name}.*exposure surface"):

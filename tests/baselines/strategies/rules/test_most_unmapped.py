@@ -10,11 +10,8 @@ import pytest
 from baselines.strategies import make_strategy
 from baselines.strategies.rules.most_unmapped import LeastMapped, MostUnmapped, RandomKnown
 from baselines.strategies.rules.next_best_view import NextBestView
-from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import view_of
-from entropy_explore_env.settings.scenarios import TERRAIN
 from tests.baselines.strategies.rules.scenes import missions_of, play
-from tests.reference.scenes import started
 
 COUNTED = {MostUnmapped: (1, 1.0), LeastMapped: (0, -1.0)}
 """Rule → which of the counts in view it compares, and with which sign."""
@@ -56,11 +53,3 @@ def test_every_method_maps_with_and_without_a_reach_and_with_a_teammate(name):
         clock = missions.state.missions[0]
         assert clock["explored_visible"] / clock["visible"] > 0.1
         assert len({tuple(viewpoint) for _, viewpoint in chosen}) > 10
-
-
-@pytest.mark.parametrize("name", ["next-best-view", "raster"])
-def test_worlds_with_an_exposure_surface_are_refused(name):
-    missions, strategy = started(TERRAIN), make_strategy(name)
-    strategy.reset(missions.scenario, np.random.default_rng(0))
-    with pytest.raises(SettingError, match=f"{name}.*without an exposure surface"):
-        strategy.choose(view_of(missions, 0, 0))

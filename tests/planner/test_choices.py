@@ -1,0 +1,73 @@
+"""What decides by hand: the recipe of a robot, a planner's next state, and the target of a tour."""
+
+import math
+
+import numpy as np
+import pytest
+
+from entropy_explore_env.frontiers.blocks import NONE
+from entropy_explore_env.planner.recipe import (
+    ALL_AROUND,
+    NARROW_PLANNED,
+    NARROW_STRAIGHT,
+    angular_spread,
+    recipe_for,
+)
+from entropy_explore_env.planner.scene import best_of
+from entropy_explore_env.planner.states import PlannerState, next_state
+from entropy_explore_env.planner.thresholds import DEPLETED_SCANS
+from entropy_explore_env.planner.tour import Tour
+from entropy_explore_env.settings.scenarios import SCENARIOS
+from tests.planner.scenes import cell, corridor, scene_of, varied
+
+
+@pytest.mark.parametrize(
+    ("name", "recipe"),
+    [
+        ("room", NARROW_STRAIGHT),
+        ("terrain", NARROW_STRAIGHT),
+        ("cave", NARROW_PLANNED),
+        ("lab", NARROW_PLANNED),
+        ("occlusions", NARROW_PLANNED),
+        ("office", ALL_AROUND),
+    ],
+)
+def test_the_recipe_is_that_of_the_robot(name, recipe):
+    assert recipe_for(SCENARIOS[name].kinds[0]) is recipe
+
+
+def test_gazes_of_scanners_vary_between_rays_and_of_others_by_half_a_view():
+    office, room = SCENARIOS["office"].kinds[0], SCENARIOS["room"].kinds[0]
+    assert angular_spread(office) == pytest.approx(0.25 * office.sensor.angular_step_rad)
+    assert angular_spread(room) == pytest.approx(0.5 * room.sensor.field_of_view_rad[0])
+
+
+@pytest.mark.parametrize(
+    ("low_gain_scans", "leaves", "best_bits", "gives_way", "state"),
+    [
+        (0, False, math.inf, False, PlannerState.EXPLORING),
+        (DEPLETED_SCANS - 1, True, 1.0, False, PlannerState.LEAVING),
+        (DEPLETED_SCANS, True, 1.0, False, PlannerState.DEPLETED),
+        (DEPLETED_SCANS, True, 1e-6, False, PlannerState.WANDERING),
+        (0, False, 1.0, True, PlannerState.WANDERING),
+    ],
+)
+def test_what_is_most_urgent_decides(low_gain_scans, leaves, best_bits, gives_way, state):
+    assert next_state(low_gain_scans, leaves, best_bits, gives_way) == state
+
+
+def test_a_cell_as_good_as_the_target_does_not_replace_it():
+    voxels, worth = np.array([4, 9, 2]), np.array([1.0, 3.0, 3.0])
+    assert [best_of(voxels, worth, target) for target in (2, 9, 4)] == [2, 9, 9]
+    assert best_of(voxels, np.full(3, -np.inf), 4) == NONE and best_of(voxels[:0], worth[:0], 4) == NONE
+
+
+def test_a_tour_of_both_ends_begins_with_the_nearer_and_keeps_its_target_when_that_is_as_good():
+    plan = corridor()
+    assert cell(plan, varied(Tour(), near=1.5, cover=0.5).pick(scene_of(plan, (8, 1)))) == (1, 1)
+    assert cell(plan, varied(Tour(), near=1.5, cover=0.5).pick(scene_of(plan, (20, 1)))) == (27, 1)
+    right = int(np.ravel_multi_index((27, 1), plan.shape))
+    near_middle = scene_of(plan, (13, 1), target=right)
+    assert cell(plan, varied(Tour(), near=1.5, cover=0.5, stay=0.2).pick(near_middle)) == (27, 1)
+    restless = varied(Tour(), near=1.5, cover=0.5, stay=0.0)
+    assert cell(plan, restless.pick(scene_of(plan, (13, 1), target=right))) == (1, 1)
