@@ -89,7 +89,7 @@ def main(words: Sequence[str]) -> int:
 
 
 def beside_each_other(films: Sequence[Film], names: Sequence[str], width: int) -> Iterator[np.ndarray]:
-    """Pictures (H, W, 3) uint8 of several missions on one clock, each under its name; the last one repeated.
+    """Yield pictures (H, W, 3) uint8 of several missions on one clock, each under its name.
 
     Args:
         films: Of the missions; one that is over stands still.

@@ -195,7 +195,7 @@ class Floor:
         self.run()
 
     def run(self) -> None:
-        """One scan after the other, each many times."""
+        """Fuse one scan after the other, each many times."""
         for crossed, ends in self._lists:
             fuse_floor(crossed, ends, self._gain, self._mean, self._precision, _FLOOR_PASSES)
 

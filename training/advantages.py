@@ -134,7 +134,7 @@ class Steps(NamedTuple):
 
     @classmethod
     def empty(cls, steps: int, robots: int) -> Steps:
-        """Nothing decided, nothing earned."""
+        """Return a rollout in which nothing was decided or earned."""
         shape = (steps, robots)
         flags, numbers = (np.zeros(shape, bool) for _ in range(2)), (np.zeros(shape) for _ in range(3))
         return cls(*flags, *numbers)
@@ -236,7 +236,7 @@ class DecisionBuffer(RolloutBuffer):
         self.add(*step)
 
     def compute_returns_and_advantage(self, last_values: torch.Tensor, dones: np.ndarray) -> None:
-        """Advantages of the decisions, and their returns, which the critic is to learn."""
+        """Compute the advantages of the decisions, and their returns, which the critic is to learn."""
         del dones  # the steps say how missions ended
         stats = self.return_stats
         values = stats.denormalise(self.values.astype(np.float64))
@@ -252,7 +252,7 @@ class DecisionBuffer(RolloutBuffer):
         self.advantages = advantages.astype(np.float32)
 
     def get(self, batch_size: int | None = None) -> Generator[RolloutBufferSamples, None, None]:
-        """Every decision once, in minibatches of nearly equal size.
+        """Yield every decision once, in minibatches of nearly equal size.
 
         Raises:
             SettingError: No robot decided twice in the rollout.

@@ -165,7 +165,7 @@ def panorama_form(kind: str, yaws: int, pitches: int) -> dict[str, dict[str, Any
 
 
 def candidate_form(candidates: int) -> dict[str, Any]:
-    """Actions and observation of a policy over candidates; nothing of it depends on the team or the world."""
+    """Return the actions and observation of a policy over candidates, the same for all teams and worlds."""
     nothing_else = dict.fromkeys(("panorama", "self_state", "team"), False)
     seen = dict.fromkeys(("candidates", "overlaps", "action_mask", "flat"), True)
     return {

@@ -136,7 +136,7 @@ class _Actions(Distribution):
         return self._drawn.sample()
 
     def rsample(self, **kwargs: Any) -> torch.Tensor:  # noqa: ANN401 - RLlib's
-        """Discrete actions have no gradient."""
+        """Refuse: discrete actions have no gradient."""
         raise NotImplementedError
 
     def logp(self, value: torch.Tensor, **kwargs: Any) -> torch.Tensor:  # noqa: ANN401 - RLlib's
@@ -298,7 +298,7 @@ class DecisionLearner(PPOTorchLearner):
     """PPO's loss is RLlib's."""
 
     def configure_optimizers_for_module(self, module_id: str, config: Any = None) -> None:  # noqa: ANN401
-        """Adam as Stable-Baselines3 has it."""
+        """Make Adam as Stable-Baselines3 has it."""
         module = self.module[module_id]
         parameters: Any = self.get_parameters(module)
         self.register_optimizer(
@@ -328,7 +328,7 @@ class DecisionLearner(PPOTorchLearner):
                 self._set_optimizer_lr(optimiser, rate)
 
     def after_gradient_based_update(self, *, timesteps: dict[str, Any]) -> None:
-        """Take what was learned from into the normalisation of observations."""
+        """Update the normalisation of observations by those that were learned from."""
         super().after_gradient_based_update(timesteps=timesteps)
         for _, module in self._modules():
             module.learn_stats(self._advantages.learned)

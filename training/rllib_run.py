@@ -57,7 +57,7 @@ def policy_of(args: Args, env_settings: dict[str, Any]) -> PolicySettings:
 
 
 def configure(args: Args, env_settings: dict[str, Any], iterations: int = 0) -> Any:  # noqa: ANN401 - PPOConfig
-    """RLlib's settings.
+    """Return RLlib's settings.
 
     Args:
         args: The command's.
@@ -116,7 +116,7 @@ def configure(args: Args, env_settings: dict[str, Any], iterations: int = 0) -> 
 
 
 def _policy_of(agent: Any, episode: Any, **others: Any) -> str:  # noqa: ANN401 - RLlib's signature
-    """All robots share one policy."""
+    """Return the one policy that all robots share."""
     del agent, episode, others
     return POLICY
 

@@ -29,13 +29,13 @@ class RecordedEnv(EntropyExploreEnv):
     returned: tuple[dict[str, float], dict[str, bool], dict[str, bool]]
 
     def reset(self, *args: Any, **kwargs: Any) -> Any:  # noqa: ANN401 - as the environment has it
-        """As the environment's."""
+        """Reset the environment, and keep what it returned."""
         result = super().reset(*args, **kwargs)
         self.observed = result[0]
         return result
 
     def step(self, *args: Any, **kwargs: Any) -> Any:  # noqa: ANN401 - as the environment has it
-        """As the environment's."""
+        """Take a step, and keep what it returned."""
         result = super().step(*args, **kwargs)
         self.observed, rewards, terminations, truncations, _ = result
         self.returned = (rewards, terminations, truncations)

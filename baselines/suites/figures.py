@@ -63,7 +63,7 @@ def fault_figure(times: Times) -> Figure:
 def _draw_strategy(
     axes: Axes, times: Times, team: tuple[str, int], number: int, strategy: str, names: list[str]
 ) -> None:
-    """Points of a strategy with their intervals, those of lost messages joined by a line."""
+    """Draw the points of a strategy with their intervals, those of lost messages joined by a line."""
     colour: Any = COLOURS[number % len(COLOURS)]
     shift = 0.09 * (number - 0.5 * (len(times.strategies) - 1))
     line = []

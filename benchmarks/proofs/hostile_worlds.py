@@ -184,7 +184,7 @@ def hostile_glb(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 def drawn_octree(data: bytes, rng: np.random.Generator) -> bytes:
-    """Another OctoMap tree under the same head: of drawn nodes, some too deep, its size seldom wrong."""
+    """Return an OctoMap tree of drawn nodes under the same head, some too deep, its size seldom wrong."""
     head, found, _ = data.partition(b"\ndata\n")
     if not (found and head.startswith(b"# Octomap OcTree")):
         return absurd_binary(data, rng)

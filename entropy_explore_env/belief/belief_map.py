@@ -69,7 +69,7 @@ class Map:
         return np.where(self.known, np.where(self.mean > 0.5, SOLID, FREE), UNKNOWN).astype(np.int8)
 
     def __repr__(self) -> str:
-        """Its size and how much of it is known."""
+        """Return its size and how much of it is known."""
         x, y, z = self.grid.shape
         share = float(self.known.mean())
         return f"Map({x} × {y} × {z} voxels of {self.grid.voxel_size_m:g} m, {share:.1%} known)"

@@ -96,7 +96,7 @@ def pool_belief(pool, mean, precision):
 
 @lean_kernel
 def fuse_pooled_scan(scan, count, mean, precision, pool):
-    """Like `fuse_scan`; the sums of the cells that the rays cross follow.
+    """Fuse a scan as `fuse_scan` does, and keep the sums of the cells that its rays cross up to date.
 
     Args:
         scan: Scan with crossings filled in.

@@ -32,7 +32,7 @@ _progress = _Progress()
 
 
 def compiled_kernels() -> tuple[str, ...]:
-    """Kernels that this process has compiled for Python, once for each combination of types."""
+    """Return the kernels that this process has compiled for Python, once for each combination of types."""
     return tuple(_progress.compiled)
 
 
@@ -66,7 +66,7 @@ def end_of_step() -> None:
 
 
 def explain_not_kept(folder: Path | None, error: OSError | None) -> None:
-    """Compiled code cannot be written; said once."""
+    """Say once that compiled code cannot be written."""
     if _progress.said_why_not_kept:
         return
     _progress.said_why_not_kept = True

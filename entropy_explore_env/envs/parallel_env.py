@@ -231,7 +231,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
         return dict(zip(self.agents, robot_infos(self.missions, 0), strict=True))
 
     def __repr__(self) -> str:
-        """Its scenario, its team and its voxels."""
+        """Return its scenario, its team and its voxels."""
         return f"EntropyExploreEnv({self.scenario.in_short})"
 
     def joint_map(self) -> Map:

@@ -148,7 +148,7 @@ class RobotVecEnv(VecEnv):
         return self._rows(observations)
 
     def set_options(self, options: list[dict[str, Any]] | dict[str, Any] | None = None) -> None:
-        """Options of the next reset: see `reset`.
+        """Take the options of the next reset: see `reset`.
 
         Raises:
             SettingError: An option is unknown or not allowed. Nothing has changed then.
@@ -171,7 +171,7 @@ class RobotVecEnv(VecEnv):
         return [mission_options(options, scenario) for options in rows[:: self._robots]]
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Seeds of the missions at the next reset, consecutive from this one; None = fresh ones.
+        """Take the seeds of the missions at the next reset, consecutive from this one; None = fresh ones.
 
         Raises:
             SettingError: It is no whole number ≥ 0.
@@ -261,7 +261,7 @@ class RobotVecEnv(VecEnv):
         return rows | snapshot(self.vector_env.missions)
 
     def set_arrays(self, arrays: Mapping[str, np.ndarray]) -> None:
-        """Be where rows of the same scenario and number were, bitwise.
+        """Restore the state of rows of the same scenario and number, bitwise.
 
         Args:
             arrays: As `arrays` gave them.
@@ -304,7 +304,7 @@ class RobotVecEnv(VecEnv):
         return list(self.vector_env.render()) if self.vector_env.render_mode == "rgb_array" else []
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:  # noqa: ANN401
-        """Rows share their missions: none has attributes of its own.
+        """Refuse: rows share their missions, and none has attributes of its own.
 
         Raises:
             SettingError: Always.
@@ -332,5 +332,5 @@ class RobotVecEnv(VecEnv):
         return [masks[row] for row in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: type, indices: Any = None) -> list[bool]:  # noqa: ANN401
-        """No row is wrapped."""
+        """Return False for each row: none is wrapped."""
         return [False for _ in self._get_indices(indices)]

@@ -95,7 +95,7 @@ class SingleRobotEnv(gymnasium.Env[Any, Any]):
         return self.team.view(_ROBOT)
 
     def __repr__(self) -> str:
-        """Its scenario and its voxels."""
+        """Return its scenario and its voxels."""
         return f"SingleRobotEnv({self.scenario.in_short})"
 
     def render(self) -> Any:  # noqa: ANN401 - Gymnasium's signature

@@ -284,7 +284,7 @@ class EntropyExploreVectorEnv(VectorEnv[Any, Any, Any]):
         return infos
 
     def render(self) -> Any:  # noqa: ANN401 - Gymnasium's signature
-        """For `rgb_array` a picture of each mission, E of (480, 640, 3) uint8; `human` shows the first.
+        """Return a picture of each mission, E of (480, 640, 3) uint8; with `human` show the first mission.
 
         Paths and curves begin at the missions' reset.
         """

@@ -26,7 +26,7 @@ class Canvas:
     """
 
     def __init__(self, grid: Grid, yaw_rad: float, prior_precision: float | np.float32) -> None:
-        """Nothing is known yet."""
+        """Begin with nothing known."""
         self.grid, self.yaw_rad, self.prior_precision = grid, yaw_rad, np.float32(prior_precision)
         self.mean = np.full(grid.shape, PRIOR_MEAN, np.float32)
         self.precision = np.full(grid.shape, prior_precision, np.float32)

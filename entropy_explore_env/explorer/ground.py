@@ -73,7 +73,7 @@ class Ground:
         return self._task.planar if self._canvas is None else self._canvas.grid.flat
 
     def _stays_level(self, layers: int) -> bool:
-        """Whether the height of the canvas is that of the maps, above whose floor robots stay in a plane."""
+        """Return whether the canvas is as high as the maps, above whose floor robots stay in a plane."""
         return layers == 1 or any(kind.robot.motion == "planar" for kind in self._task.kinds)
 
     def _with_margin(

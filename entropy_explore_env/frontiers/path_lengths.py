@@ -40,7 +40,7 @@ class KnownPaths:
     """
 
     def __init__(self, scenario: Scenario, kind: RobotKind, cells: VoxelFrontiers, search: Search) -> None:
-        """Paths in the map of `cells`, which may change between searches."""
+        """Search paths in the map of `cells`, which may change between searches."""
         self._cells, self.search, self._grid = cells, search, scenario.grid
         self.lattice = new_lattice(scenario.grid.shape, 0.0, scenario.layer_of(kind.robot))
         self.costs = costs_of(cells.traversal_cost, 1.0)

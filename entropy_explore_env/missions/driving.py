@@ -216,7 +216,7 @@ def redecide(robot, time_s):
 
 @lean_kernel
 def stop(params, robot, time_s):
-    """After the scan where its drive ended a robot decides anew; behind a teammate it may wait before."""
+    """Let a robot decide after the scan where its drive ended; behind a teammate it may wait first."""
     robot.waiting = params.blocked_wait_s > 0.0 and robot.move_end == _TEAMMATE
     robot.deciding = not robot.waiting
     robot.ready_s = time_s + params.blocked_wait_s if robot.waiting else time_s
@@ -250,7 +250,7 @@ def halt(params, robot, time_s, until_s):
 
 @lean_kernel
 def next_decision(params, robots):
-    """When the next robot decides: now, under way, after the scan at its drive's end, or when it has waited.
+    """Return when the next robot decides: now, under way, after its drive's last scan, or after a wait.
 
     A drive that something under way may still end is taken to end where it was meant to.
     """
@@ -274,7 +274,7 @@ def plan_scan(params, robot):
 
 @lean_kernel
 def continue_drive(params, footprint, mean, robot, estimate, time_s, crossing):
-    """After a scan under way: see whether the rest of a planned path is believed blocked.
+    """See, after a scan under way, whether the rest of a planned path is believed blocked.
 
     Then the drive ends, or a robot that decides under way does so now; some do so at every such scan.
 

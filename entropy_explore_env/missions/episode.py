@@ -147,7 +147,7 @@ def _set_seen_goal(scenario: Scenario, state: MissionState, mission: int, start:
 def _set_entropies(
     scenario: Scenario, state: MissionState, mission: int, prior_precision: float, visible_voxels: int
 ) -> None:
-    """H(0) by eq. 25, and H_th: voxels that can be seen at σ_end, the others at the prior."""
+    """Set H(0) by eq. 25, and H_th: voxels that can be seen at σ_end, the others at the prior."""
     voxel_bits = float(map_entropy_bits(np.full((1, 1, 1), prior_precision, np.float32)))
     known_bits = gaussian_entropy_bits(scenario.ending.sigma_end)
     hidden = scenario.grid.voxels - visible_voxels

@@ -114,7 +114,7 @@ class Missions:
         self._make_compiled_step()
 
     def _make_compiled_step(self) -> None:
-        """Threads and their memory; none of it is state."""
+        """Make the threads and their memory; none of it is state."""
         self._compiled_step = CompiledStep(self.scenario, self.rules, self.layout, self.count, self.threads)
 
     def log_scans(self, most: int) -> ScanLog:
@@ -367,7 +367,7 @@ class Missions:
         self._compiled_step.close()
 
     def __getstate__(self) -> dict[str, object]:
-        """All but the threads and their memory."""
+        """Return all but the threads and their memory."""
         kept = dict(self.__dict__)
         del kept["_compiled_step"]
         return kept
@@ -386,7 +386,7 @@ class Missions:
 
 
 def _for_kernels(actions: np.ndarray, dtype: type[np.generic]) -> np.ndarray:
-    """Actions in the one kind of array for which a step is compiled: copied where they are of another."""
+    """Return actions in the one kind of array for which a step is compiled; others are copied."""
     try:
         array = np.ascontiguousarray(actions, dtype)
     except Exception:  # whatever was given in place of numbers

@@ -16,7 +16,7 @@ class Threads:
     """
 
     def __init__(self, count: int) -> None:
-        """Nothing is begun yet."""
+        """Begin nothing yet."""
         self._count = count
         self._pool: ThreadPoolExecutor | None = None
         _ALL.add(self)

@@ -65,7 +65,7 @@ class RobotView(RobotKnowledge):
     landmarks: np.ndarray = field(default_factory=lambda: np.zeros(0, LANDMARK))
 
     def __repr__(self) -> str:
-        """Who it is, when and where, not what it holds to be true."""
+        """Return who it is, when and where, not what it holds to be true."""
         x, y, z = self.mean.shape
         state = "deciding" if self.deciding else "busy"
         who = f"robot_{self.robot} of {self.scenario.robots} in {self.scenario.name!r}"
@@ -84,7 +84,7 @@ class RobotView(RobotKnowledge):
         return Map(self.scenario.grid, self.mean, self.precision, self.scenario.sigma_prior)
 
     def scan_places(self, path_m: np.ndarray) -> np.ndarray:
-        """Where the robot would scan under way on a path from its place, the scan at its end not among them.
+        """Return where the robot would scan on a path from its place, but for the scan at its end.
 
         It does so after every `scan_every_m` that it has driven. The way to brake, where it has to come to
         rest first, is not taken into account.
@@ -104,7 +104,7 @@ class RobotView(RobotKnowledge):
         return np.stack([np.interp(scans_m, ends_m, points[:, axis]) for axis in range(3)], axis=1)
 
     def no_fly_mask(self) -> np.ndarray | None:
-        """(X, Y, Z) bool, where the body that it plans for reaches above the ceiling; None = no ceiling."""
+        """Return (X, Y, Z) bool, where the body that it plans for is above the ceiling; None = no ceiling."""
         if self.ceiling is None:
             return None
         grid = self.scenario.grid

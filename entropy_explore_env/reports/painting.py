@@ -106,7 +106,7 @@ class Painter:
         return self.paint(missions)
 
     def __getstate__(self) -> dict[str, object]:
-        """All but the window, which cannot be copied; a copy opens a window of its own."""
+        """Return all but the window, which cannot be copied; a copy opens a window of its own."""
         return {**self.__dict__, "_window": None}
 
     def paint(self, missions: Missions) -> np.ndarray:

@@ -202,7 +202,7 @@ def _pooled(values: np.ndarray, view: View, pool: np.ufunc) -> np.ndarray:
 
 
 def _draw_robots(picture: Image.Image, view: View, frame: Frame, unit: int) -> None:
-    """Driven paths, fiducials, chosen viewpoints, robots with their gazes, then where they truly are.
+    """Draw driven paths, fiducials, chosen viewpoints, robots with their gazes, then where they truly are.
 
     What belongs to a robot has its colour.
     """

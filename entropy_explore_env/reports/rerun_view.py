@@ -158,7 +158,7 @@ class RerunView:
         self._stream.log(f"world/paths/robot_{robot}/{part:04}", strip)
 
     def _log_scan(self, robot: int) -> None:
-        """Field of view of a robot's latest scan, and the rays that were sent."""
+        """Log the field of view of a robot's latest scan, and the rays that were sent."""
         rr, missions, colour = self._rr, self._missions, robot_colour(robot)
         own, sensor = missions.state.robots[0, robot], missions.scenario.kind_of(robot).sensor
         pose, depth_m = own["scan_pose"], max(float(own["depth_m"]), missions.grid.voxel_size_m)
@@ -217,7 +217,7 @@ class _Cells:
         return blocks
 
     def _seen(self, missions: Missions) -> tuple[np.ndarray, np.ndarray]:
-        """Level of entropy of each cell, int8, _UNKNOWN where little is known; and whether it is covered."""
+        """Return each cell's level of entropy, int8, _UNKNOWN where little is known; which are covered."""
         share = entropy_share(missions, 0, 0)
         covered = (share < KNOWN_BELOW) & (missions.mean[0, 0] > 0.5)
         if self.stride > 1:
@@ -242,7 +242,7 @@ def _block_sums(cells: np.ndarray) -> np.ndarray:
 
 
 def cone_edges(sensor: RangeSensor, yaw: float, pitch: float) -> list[np.ndarray]:
-    """Polylines (N, 3) around the field of view of a sensor at (0, 0, 0), 1 m away: outline and edges."""
+    """Return polylines (N, 3) around the view of a sensor at (0, 0, 0), 1 m away: outline and edges."""
     model = sensor_model(sensor)
     yaws = np.linspace(model.yaw_offsets[0], model.yaw_offsets[-1], 17) + yaw
     low, high = (directions_of(yaws, pitch + model.pitch_offsets[end]) for end in (-1, 0))

@@ -34,7 +34,7 @@ class ScanView:
     utility_bits: np.ndarray
 
     def __repr__(self) -> str:
-        """From where it was taken, and how much it brought."""
+        """Return from where it was taken, and how much it brought."""
         bits = self.utility_bits.sum()
         return f"ScanView({len(self.range_m)} rays from {place_text(self.pose)}, {bits:.6g} bits)"
 
@@ -69,7 +69,7 @@ class TeammateView:
     silent: bool = False
 
     def __repr__(self) -> str:
-        """Where it was last heard, and where it went."""
+        """Return where it was last heard, and where it went."""
         if self.heard_s < 0.0:
             return "TeammateView(never heard)"
         if self.silent:

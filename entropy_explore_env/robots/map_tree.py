@@ -95,7 +95,7 @@ class Region(NamedTuple):
 
 
 def new_tree(data: np.ndarray, levels: int) -> Tree:
-    """Working space for a tree in data (M,) uint8, of a map of that many levels; 0 = only for reading."""
+    """Return working space for a tree in data (M,) uint8, of a map of some levels; 0 = only for reading."""
     return Tree(
         coder=Coder(np.zeros(1, CODER), np.zeros(_CONTEXTS, np.uint32), data),
         walk=np.zeros(1, WALK),

@@ -14,7 +14,7 @@ _NOTHING, _HIT = int(Return.NOTHING), int(Return.HIT)
 
 @inlined_kernel
 def weigh_measurement(scan, index, params, size, start, entered):
-    """Measured coverage (eq. 4) and its precision (eq. 5) for a ray with its crossing filled in.
+    """Fill in the measured coverage (eq. 4) of a ray that was cast, and its precision (eq. 5).
 
     Args:
         entered: (L,) int64, when the ray entered its voxels.

@@ -196,7 +196,7 @@ def _about(world: World) -> str:
 
 
 def _starts(world: World, source: str) -> tuple[np.ndarray | None, str]:
-    """Where robots may start, (X, Y, Z) bool, and a sentence about it; None where they have no room."""
+    """Return where robots may start, (X, Y, Z) bool, and a sentence about it; None where there is no room."""
     name = source if source in SCENARIOS else "office" if world.grid.flat else "room"
     try:
         layout = world.layout(in_given_worlds(SCENARIOS[name], [world]))

@@ -115,7 +115,7 @@ class World:
                 array.setflags(write=False)
 
     def __repr__(self) -> str:
-        """Its name and voxels, not their content."""
+        """Return its name and voxels, not their content."""
         x, y, z = self.grid.shape
         return f"World({self.name!r}, {x} × {y} × {z} voxels of {self.grid.voxel_size_m:g} m)"
 

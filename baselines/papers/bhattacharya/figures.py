@@ -41,7 +41,7 @@ def _tessellated(occupied: np.ndarray, places: list[int]) -> np.ndarray:
 
 
 def _draw_paths(axes: Axes, places: np.ndarray, width: int) -> None:
-    """Trajectories (T, A) of cells, start hollow, end filled."""
+    """Draw trajectories (T, A) of cells, start hollow, end filled."""
     for robot in range(places.shape[1]):
         x, y = places[:, robot] // width, places[:, robot] % width
         colour = COLOURS[robot % len(COLOURS)]

@@ -167,7 +167,7 @@ class Measured:
         return {"largest": self.largest.settings}
 
     def run(self) -> Record:
-        """Measure.
+        """Measure the splits and the time of a tessellation.
 
         Returns:
             `splits`, ratios of (c) by region; `ours_s` and `scipy_s` of a tessellation.

@@ -44,7 +44,7 @@ def cell_id(method: int) -> str:
 
 
 def scenario_of(steps: int) -> Scenario:
-    """`cliff` for some steps after the first looks; a drive leads wherever the rover wants."""
+    """Return `cliff` for some steps after the first looks; a drive leads wherever the rover wants."""
     ending = {"max_cycles": LOOKS + steps, "time_limit_s": 1e6}
     return with_settings(CLIFF, {"robot": {"reach_m": math.inf}, "ending": ending})
 

@@ -230,7 +230,7 @@ def _add_volumes(
 def _add_large(
     volumes: np.ndarray, low: np.ndarray, high: np.ndarray, begin: np.ndarray, count: np.ndarray
 ) -> None:
-    """As `_add_volumes`, cube by cube, for cubes over many voxels."""
+    """Do what `_add_volumes` does cube by cube, for cubes over many voxels."""
     for a, b, at in zip(low, high, begin, strict=True):
         sides = [
             np.minimum(b[axis], (cells := at[axis] + np.arange(count[axis])) + 1) - np.maximum(a[axis], cells)

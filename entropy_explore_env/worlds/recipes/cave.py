@@ -29,7 +29,7 @@ _LOOPS = 0.15
 
 
 def cave(grid: Grid, rng: np.random.Generator) -> World:
-    """Halls and tunnels in rock, at all heights in 3-D; a plan of them in 2-D."""
+    """Make halls and tunnels in rock, at all heights in 3-D; a plan of them in 2-D."""
     require_size(grid, "a cave", 12.0, 10.0)
     narrowest = BODY_RADIUS_M + 1.8 * grid.voxel_size_m + 0.2
     axes = 2 if grid.flat else 3

@@ -102,7 +102,7 @@ def _polygon(longest: float, rng: np.random.Generator) -> tuple[np.ndarray, np.n
 
 
 def cluttered(grid: Grid, rng: np.random.Generator) -> World:
-    """Obstacles scattered over a floor; in 3-D each has a height of its own."""
+    """Scatter obstacles over a floor; in 3-D each has a height of its own."""
     require_size(grid, "clutter", 6.0, 5.0)
     solid, numbers = cluttered_plan((grid.shape[0], grid.shape[1]), grid.voxel_size_m, rng)
     if grid.flat:
@@ -123,7 +123,7 @@ def cluttered_plan(
 
 
 def occlusions(grid: Grid, rng: np.random.Generator) -> World:
-    """Convex occlusions on a plane; they are as high as the workspace where it is 3-D.
+    """Make convex occlusions on a plane; they are as high as the workspace where it is 3-D.
 
     Robots start anywhere in it; the paper's start, the middle, is always free.
     """

@@ -32,7 +32,7 @@ _AREA_A_PIECE_M2 = 5.0
 
 
 def office(grid: Grid, rng: np.random.Generator) -> World:
-    """Rooms along corridors; cross corridors join the corridors where there are several.
+    """Make rooms along corridors; cross corridors join the corridors where there are several.
 
     2-D offices are bare; in 3-D ones desks, cupboards, shelves and tables stand in the rooms.
     """

@@ -26,17 +26,17 @@ _HULL_M = 6.0
 
 
 def smooth_terrain(grid: Grid, rng: np.random.Generator) -> World:
-    """Gentler hills; see `terrain`."""
+    """Make gentler hills; see `terrain`."""
     return _ground(grid, rng, _SMOOTH, "terrain-smooth")
 
 
 def rough_terrain(grid: Grid, rng: np.random.Generator) -> World:
-    """Rugged hills; see `terrain`."""
+    """Make rugged hills; see `terrain`."""
     return _ground(grid, rng, _ROUGH, "terrain-rough")
 
 
 def terrain(grid: Grid, rng: np.random.Generator) -> World:
-    """Hills and valleys below a ceiling for robots, with open sky above it.
+    """Make hills and valleys below a ceiling for robots, with open sky above it.
 
     The space between ground and ceiling in which a body of 0.3 m radius fits is connected, and so is
     all free space.
