@@ -176,7 +176,8 @@ def examples(user: User) -> None:
         folder = user.home / "examples" / re.sub(r"\W", "-", block.name)
         folder.mkdir(parents=True)
         (folder / "example.py").write_text(block.text, encoding="utf-8")
-        words = [user.python, "-c", f"import sys; sys.path.insert(0, {str(user.clone)!r}); {_RUN_FILE}"]
+        found_in = [str(user.clone), str((user.clone / block.name).parent)]  # a file imports its neighbours
+        words = [user.python, "-c", f"import sys; sys.path[:0] = {found_in}; {_RUN_FILE}"]
         user.call(words, folder)
 
 
