@@ -87,9 +87,7 @@ def _given(options: Iterable[Option], words: Sequence[str]) -> dict[str, Any]:
         _add(parser, option)
     found, unknown = parser.parse_known_intermixed_args([_spelled(word) for word in words])
     if unknown and unknown[0].startswith("-"):
-        flags = [option.flag for option in options if not option.positional]
-        meant = did_you_mean(unknown[0].partition("=")[0], flags) or "; see --help"
-        raise UsageError(f"{unknown[0]}: no such option{meant}")
+        raise UsageError(f"{unknown[0]}: no such option{_meant(unknown[0], options)}")
     if unknown:
         raise UsageError(f"{unknown[0]}: expected an option; see --help")
     tree: dict[str, Any] = {}
@@ -102,6 +100,16 @@ def _given(options: Iterable[Option], words: Sequence[str]) -> dict[str, Any]:
             inner = inner.setdefault(name, {})
         inner[option.path[-1]] = _joined(option, value)
     return tree
+
+
+def _meant(word: str, options: Iterable[Option]) -> str:
+    """Return what a word that is no option probably means, with what comes before."""
+    flag = word.partition("=")[0]
+    for option in options:
+        if option.positional and flag == option.flag:
+            return f"; its value stands alone: {_program()} {option.name.upper()}"
+    flags = [option.flag for option in options if not option.positional]
+    return did_you_mean(flag, flags) or "; see --help"
 
 
 def _add(parser: argparse.ArgumentParser, option: Option) -> None:
