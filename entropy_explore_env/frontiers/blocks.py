@@ -34,7 +34,9 @@ DROPPED = 8
 """An edge that a scan from beside it did not explore: nothing beside it alone is a candidate."""
 ROOM = 16
 """A robot may scan from here, and has not yet."""
-_ALL_FLAGS = 31
+COUNTED_FREE = 32
+"""Does not count among what keeps bodies out of the cells around it: see `Blocks.blocking`."""
+_ALL_FLAGS = 63
 NONE = -1
 """In place of the number of a cell or voxel: there is none."""
 _NO_COSTS = np.zeros(0)
@@ -122,9 +124,14 @@ class Blocks(NamedTuple):
     state: np.ndarray
     """(N,) uint8: UNEXPLORED, UNMAPPED, COVERED; kept up to date by others."""
     flags: np.ndarray
-    """(N,) uint8: EDGE, CANDIDATE, EXCLUDED, DROPPED, ROOM."""
+    """(N,) uint8: EDGE, CANDIDATE, EXCLUDED, DROPPED, ROOM, COUNTED_FREE."""
+    blocking: np.ndarray
+    """(N,) int32, how many cells of the footprint in each cell are unmapped, covered or outside; the body has
+    no room unless none is. Kept up to date by others."""
     candidate: np.ndarray
-    """(B,) int32, cell; NONE = the block has no candidate."""
+    """(B,) int32, cell; NONE = no cell of the block is a CANDIDATE."""
+    edges: np.ndarray
+    """(B,) uint8, whether a block holds an EDGE."""
     dirty: np.ndarray
     """(B,) uint8, whether a block has to be updated."""
     size: tuple[int, int, int]
@@ -148,10 +155,14 @@ def new_blocks(
     flat = shape[2] == 1 or layer is not None
     across = (spacing, spacing, int(shape[2]) if flat else spacing)
     blocks = [math.ceil(n / width) for n, width in zip(shape, across, strict=True)]
+    up = np.arange(shape[2])[:, None] + footprint[:, 2]
+    limited = ((up >= 0) & (up < shape[2])) | (layer is None)  # a layer has no boundary above and below
     return Blocks(
         state=state,
         flags=np.zeros(len(state), np.uint8),
+        blocking=np.tile(limited.sum(axis=1).astype(np.int32), shape[0] * shape[1]),
         candidate=np.full(math.prod(blocks), NONE, np.int32),
+        edges=np.zeros(math.prod(blocks), np.uint8),
         dirty=np.zeros(math.prod(blocks), np.uint8),
         size=(int(shape[0]), int(shape[1]), int(shape[2])),
         across=across,
@@ -162,14 +173,26 @@ def new_blocks(
     )
 
 
+@inlined_kernel
+def _blocks_along(blocks, axis, low, high, radius):
+    """Return the first block along an axis within `radius` of some cells, and one past the last.
+
+    The cells are those from `low` up to but without `high`.
+    """
+    across = blocks.across[axis]
+    return max(low - radius, 0) // across, min(high - 1 + radius, blocks.size[axis] - 1) // across + 1
+
+
 @lean_kernel
 def mark_around(blocks, cell, radius):
     """Let the blocks with a cell within `radius` along every axis be updated next time."""
-    size, across = blocks.size, blocks.across
-    x, y, z = grid_index(size, cell)
-    for i in range(max(x - radius, 0) // across[0], min(x + radius, size[0] - 1) // across[0] + 1):
-        for j in range(max(y - radius, 0) // across[1], min(y + radius, size[1] - 1) // across[1] + 1):
-            for k in range(max(z - radius, 0) // across[2], min(z + radius, size[2] - 1) // across[2] + 1):
+    x, y, z = grid_index(blocks.size, cell)
+    rows = _blocks_along(blocks, 0, x, x + 1, radius)
+    columns = _blocks_along(blocks, 1, y, y + 1, radius)
+    layers = _blocks_along(blocks, 2, z, z + 1, radius)
+    for i in range(rows[0], rows[1]):
+        for j in range(columns[0], columns[1]):
+            for k in range(layers[0], layers[1]):
                 blocks.dirty[flat_index(blocks.blocks, i, j, k)] = 1
 
 
@@ -220,6 +243,7 @@ def mark_edges(blocks):
     for block in range(len(blocks.dirty)):
         if blocks.dirty[block] == 0:
             continue
+        blocks.edges[block] = 0
         low, high = block_span(blocks, block)
         for x in range(low[0], high[0]):
             for y in range(low[1], high[1]):
@@ -230,19 +254,38 @@ def mark_edges(blocks):
                         or shares_face(blocks, state, UNEXPLORED, UNEXPLORED, x, y, z)
                     )
                     set_flag(blocks, cell, EDGE, edge)
+                    if edge:
+                        blocks.edges[block] = 1
 
 
 @lean_kernel
 def choose_candidate(blocks, block):
     """Set CANDIDATE in a block and choose the block's candidate, for which edges and ROOM are known."""
+    blocks.dirty[block] = 0
     low, high = block_span(blocks, block)
+    if blocks.candidate[block] == NONE and not _edges_near(blocks, low, high):
+        return
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
             for z in range(low[2], high[2]):
                 cell = flat_index(blocks.size, x, y, z)
                 chosen = blocks.flags[cell] & ROOM and _meets_edge(blocks, x, y, z)
                 set_flag(blocks, cell, CANDIDATE, chosen)
-    blocks.candidate[block], blocks.dirty[block] = _nearest_to_middle(blocks, block, _NO_COSTS), 0
+    blocks.candidate[block] = _nearest_to_middle(blocks, block, _NO_COSTS)
+
+
+@lean_kernel
+def _edges_near(blocks, low, high):
+    """Return whether a block that a body touches from a cell between `low` and `high` holds an EDGE."""
+    rows = _blocks_along(blocks, 0, low[0], high[0], blocks.reach)
+    columns = _blocks_along(blocks, 1, low[1], high[1], blocks.reach)
+    layers = _blocks_along(blocks, 2, low[2], high[2], blocks.reach)
+    for i in range(rows[0], rows[1]):
+        for j in range(columns[0], columns[1]):
+            for k in range(layers[0], layers[1]):
+                if blocks.edges[flat_index(blocks.blocks, i, j, k)]:
+                    return True
+    return False
 
 
 @inlined_kernel

@@ -17,6 +17,7 @@ from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.frontiers.blocks import (
     CANDIDATE,
+    COUNTED_FREE,
     COVERED,
     DROPPED,
     EDGE,
@@ -60,8 +61,23 @@ def update_voxels(states, blocks, cost, mean, precision, levels):
             z = grid_index(blocks.size, voxel)[2]
             if blocks.layer < 0 or abs(z - blocks.layer) <= blocks.reach + 2:
                 mark_around(blocks, voxel, blocks.reach + 2)
+                _count_blocking(blocks, voxel)
     update_blocks(blocks, cost)
     return changed
+
+
+@lean_kernel
+def _count_blocking(blocks, voxel):
+    """Count a voxel that is mapped free now, or no longer, in all voxels in which the body touches it."""
+    free = blocks.state[voxel] & (UNMAPPED | COVERED) == 0
+    if free == (blocks.flags[voxel] & COUNTED_FREE > 0):
+        return
+    set_flag(blocks, voxel, COUNTED_FREE, free)
+    x, y, z = grid_index(blocks.size, voxel)
+    for offset in blocks.footprint:
+        near = cell_at(blocks.size, x - offset[0], y - offset[1], z - offset[2])
+        if near != NONE:
+            blocks.blocking[near] += -1 if free else 1
 
 
 @lean_kernel
@@ -81,22 +97,10 @@ def _find_room(blocks, cost, block):
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
             for z in range(low[2], high[2]):
-                voxel, stands = flat_index(blocks.size, x, y, z), _may_stand(blocks, x, y, z)
+                voxel = flat_index(blocks.size, x, y, z)
+                stands = blocks.blocking[voxel] == 0
                 cost[voxel] = 1.0 if stands else math.inf
                 set_flag(blocks, voxel, ROOM, stands and blocks.flags[voxel] & EXCLUDED == 0)
-
-
-@lean_kernel
-def _may_stand(blocks, x, y, z):
-    """Return whether the body's footprint is mapped, believed free and inside the workspace."""
-    for offset in blocks.footprint:
-        up = z + offset[2]
-        if blocks.layer >= 0 and not 0 <= up < blocks.size[2]:
-            continue  # the boundary above and below does not limit bodies that stay in a layer
-        near = cell_at(blocks.size, x + offset[0], y + offset[1], up)
-        if near == NONE or blocks.state[near] & (UNMAPPED | COVERED):
-            return False
-    return True
 
 
 @lean_kernel
