@@ -35,7 +35,7 @@ DROPPED = 8
 ROOM = 16
 """A robot may scan from here, and has not yet."""
 COUNTED_FREE = 32
-"""Does not count among what keeps bodies out of the cells around it: see `Blocks.blocking`."""
+"""Counts as free in the cells in which a body touches it: see `Blocks.free`."""
 _ALL_FLAGS = 63
 NONE = -1
 """In place of the number of a cell or voxel: there is none."""
@@ -125,9 +125,9 @@ class Blocks(NamedTuple):
     """(N,) uint8: UNEXPLORED, UNMAPPED, COVERED; kept up to date by others."""
     flags: np.ndarray
     """(N,) uint8: EDGE, CANDIDATE, EXCLUDED, DROPPED, ROOM, COUNTED_FREE."""
-    blocking: np.ndarray
-    """(N,) int32, how many cells of the footprint in each cell are unmapped, covered or outside; the body has
-    no room unless none is. Kept up to date by others."""
+    free: np.ndarray
+    """(N,) uint16 or uint32, how many cells of the footprint in each cell are mapped and free; kept up to
+    date by others. (0,) in plans and layers, where footprints are small enough to look at them."""
     candidate: np.ndarray
     """(B,) int32, cell; NONE = no cell of the block is a CANDIDATE."""
     edges: np.ndarray
@@ -155,12 +155,11 @@ def new_blocks(
     flat = shape[2] == 1 or layer is not None
     across = (spacing, spacing, int(shape[2]) if flat else spacing)
     blocks = [math.ceil(n / width) for n, width in zip(shape, across, strict=True)]
-    up = np.arange(shape[2])[:, None] + footprint[:, 2]
-    limited = ((up >= 0) & (up < shape[2])) | (layer is None)  # a layer has no boundary above and below
+    counted = 0 if flat else len(state)
     return Blocks(
         state=state,
         flags=np.zeros(len(state), np.uint8),
-        blocking=np.tile(limited.sum(axis=1).astype(np.int32), shape[0] * shape[1]),
+        free=np.zeros(counted, np.min_scalar_type(max(len(footprint), 256))),
         candidate=np.full(math.prod(blocks), NONE, np.int32),
         edges=np.zeros(math.prod(blocks), np.uint8),
         dirty=np.zeros(math.prod(blocks), np.uint8),

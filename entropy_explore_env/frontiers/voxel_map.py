@@ -61,13 +61,14 @@ def update_voxels(states, blocks, cost, mean, precision, levels):
             z = grid_index(blocks.size, voxel)[2]
             if blocks.layer < 0 or abs(z - blocks.layer) <= blocks.reach + 2:
                 mark_around(blocks, voxel, blocks.reach + 2)
-                _count_blocking(blocks, voxel)
+            if len(blocks.free) > 0:
+                _count_free(blocks, voxel)
     update_blocks(blocks, cost)
     return changed
 
 
 @lean_kernel
-def _count_blocking(blocks, voxel):
+def _count_free(blocks, voxel):
     """Count a voxel that is mapped free now, or no longer, in all voxels in which the body touches it."""
     free = blocks.state[voxel] & (UNMAPPED | COVERED) == 0
     if free == (blocks.flags[voxel] & COUNTED_FREE > 0):
@@ -77,7 +78,7 @@ def _count_blocking(blocks, voxel):
     for offset in blocks.footprint:
         near = cell_at(blocks.size, x - offset[0], y - offset[1], z - offset[2])
         if near != NONE:
-            blocks.blocking[near] += -1 if free else 1
+            blocks.free[near] += 1 if free else -1
 
 
 @lean_kernel
@@ -97,10 +98,24 @@ def _find_room(blocks, cost, block):
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
             for z in range(low[2], high[2]):
-                voxel = flat_index(blocks.size, x, y, z)
-                stands = blocks.blocking[voxel] == 0
+                voxel, stands = flat_index(blocks.size, x, y, z), _may_stand(blocks, x, y, z)
                 cost[voxel] = 1.0 if stands else math.inf
                 set_flag(blocks, voxel, ROOM, stands and blocks.flags[voxel] & EXCLUDED == 0)
+
+
+@lean_kernel
+def _may_stand(blocks, x, y, z):
+    """Return whether the body's footprint is mapped, believed free and inside the workspace."""
+    if len(blocks.free) > 0:
+        return blocks.free[flat_index(blocks.size, x, y, z)] == len(blocks.footprint)
+    for offset in blocks.footprint:
+        up = z + offset[2]
+        if blocks.layer >= 0 and not 0 <= up < blocks.size[2]:
+            continue  # the boundary above and below does not limit bodies that stay in a layer
+        near = cell_at(blocks.size, x + offset[0], y + offset[1], up)
+        if near == NONE or blocks.state[near] & (UNMAPPED | COVERED):
+            return False
+    return True
 
 
 @lean_kernel
