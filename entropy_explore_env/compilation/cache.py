@@ -33,7 +33,7 @@ from entropy_explore_env.compilation.folder import (
 from entropy_explore_env.compilation.numba_parts import CODE_SETTINGS, Dispatcher, config, dumps, sigutils
 from entropy_explore_env.compilation.stamps import NoStampError, describe_type, stamp
 
-_SOURCES = ("dispatchers.py", "libraries.py", "kernels.py", "cache.py", "numba_parts.py")
+_SOURCES = ("dispatchers.py", "libraries.py", "kernels.py", "cache.py", "numba_parts.py", "shortcuts.py")
 _COMPILED_BY = hashlib.sha256(
     b"".join(pkgutil.get_data(__package__ or "", name) or b"" for name in _SOURCES)
 ).hexdigest()
@@ -112,7 +112,6 @@ def save(path: Path | None, sig: Any, result: Any) -> None:  # noqa: ANN401 - a 
     """Write a result of compiling, unless it holds addresses of this process."""
     if path is None or result.library.has_dynamic_globals or result.lifted:
         return
-    result.target_context.refresh()
     data = dumps((_normal(sig), result._reduce()))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

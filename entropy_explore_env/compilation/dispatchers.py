@@ -11,7 +11,7 @@ from __future__ import annotations
 import gc
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import IO, Any
 
 from entropy_explore_env.compilation import announcement, cache, second_process
@@ -32,6 +32,7 @@ from entropy_explore_env.compilation.numba_parts import (
     type_inference_stage,
     types,
 )
+from entropy_explore_env.compilation.shortcuts import shortcuts
 from entropy_explore_env.compilation.stamps import forget_digests
 
 _WRAPPERS = {"no_cfunc_wrapper": True}
@@ -81,6 +82,7 @@ def _compiling(form: _Form, sig: Any) -> Iterator[_Compiling]:  # noqa: ANN401 -
     outermost = not _state.kernels
     if outermost:
         forget_digests()
+        form.targetctx.refresh()
     if any(compiling.form.py_func is form.py_func for compiling in _state.kernels):
         raise errors.TypingError(
             f"kernel {form.py_func.__qualname__} calls itself; Numba's own njit allows that"
@@ -92,7 +94,8 @@ def _compiling(form: _Form, sig: Any) -> Iterator[_Compiling]:  # noqa: ANN401 -
     if collecting:
         gc.disable()
     try:
-        yield compiling
+        with shortcuts(form.targetctx) if outermost else nullcontext():
+            yield compiling
     finally:
         _state.kernels.pop()
         release(compiling.claim)
@@ -201,7 +204,6 @@ class _Form(CPUDispatcher):
             if known is not None:
                 return known.entry_point
             with _compiling(self, sig) as compiling:
-                self.targetctx.refresh()
                 written = cache.load(compiling.path, sig)
                 if written is None:
                     result = self._result(compiling, args, return_type)

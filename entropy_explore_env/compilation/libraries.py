@@ -56,6 +56,10 @@ class InnerLibrary(JITCodeLibrary):
 class OuterLibrary(JITCodeLibrary):
     """The machine code of what Python calls, kept on disk without intermediate code: nothing links it."""
 
+    def _optimize_functions(self, ll_module: Any) -> None:  # noqa: ANN401 - of LLVM
+        """Leave it to the passes over the whole module."""
+        ll_module.data_layout = self.codegen._data_layout
+
     def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
         """Return what is kept of it: the machine code, and the names that it defines."""
         self._ensure_finalized()

@@ -17,11 +17,14 @@ from numba.core.compiler_machinery import AnalysisPass as AnalysisPass
 from numba.core.compiler_machinery import PassManager as PassManager
 from numba.core.compiler_machinery import register_pass as register_pass
 from numba.core.dispatcher import Dispatcher as Dispatcher
+from numba.core.funcdesc import default_mangler as default_mangler
 from numba.core.registry import CPUDispatcher as CPUDispatcher
 from numba.core.serialize import dumps as dumps
+from numba.core.targetconfig import ConfigStack as ConfigStack
 from numba.core.typed_passes import NativeLowering as NativeLowering
 from numba.core.typed_passes import NopythonTypeInference as NopythonTypeInference
 from numba.core.typed_passes import type_inference_stage as type_inference_stage
+from numba.core.types.functions import BaseFunction as BaseFunction
 
 CODE_SETTINGS = (
     "OPT",

@@ -6,10 +6,13 @@ from types import SimpleNamespace
 import llvmlite.binding as llvm
 import pytest
 from numba.core import dispatcher
+from numba.core.cpu import CPUContext
 
 from entropy_explore_env.compilation.numba_parts import (
     CODE_SETTINGS,
     UNUSED_PASSES,
+    BaseFunction,
+    ConfigStack,
     CPUDispatcher,
     JITCodeLibrary,
     NativeLowering,
@@ -25,11 +28,13 @@ from entropy_explore_env.compilation.numba_parts import (
     [
         (CPUDispatcher, ("compile", "add_overload", "_numba_type_", "_reduce_states", "_rebuild")),
         (JITCodeLibrary, ("_optimize_final_module", "_finalize_final_module", "_finalize_dynamic_globals")),
-        (JITCodeLibrary, ("_ensure_finalized", "_get_compiled_object")),
+        (JITCodeLibrary, ("_ensure_finalized", "_get_compiled_object", "_optimize_functions", "codegen")),
+        (ConfigStack, ("top_or_none",)),
+        (CPUContext, ("mangler", "refresh")),
         (JITCodeLibrary, ("serialize_using_bitcode", "serialize_using_object_code", "enable_object_caching")),
         (compiler.CompileResult, ("_reduce", "_rebuild", "_find_referenced_environments")),
         (compiler.Compiler, ("define_pipelines",)),
-        (compiler.Flags, ("copy", "nrt", "forceinline", "no_compile")),
+        (compiler.Flags, ("copy", "nrt", "forceinline", "no_compile", "summary")),
         (vars(dispatcher)["_FunctionCompiler"], ("compile", "fold_argument_types", "_customize_flags")),
         (NativeLowering, ("run_pass",)),
         (llvm, ("parse_bitcode", "parse_assembly")),
@@ -46,6 +51,8 @@ def test_what_is_called_takes_what_it_is_given():
     assert parameters(CPUDispatcher.__init__)[1:] == ["py_func", "locals", "targetoptions", "pipeline_class"]
     rebuilt = "libdata fndesc env signature objectmode lifted typeann reload_init referenced_envs".split()
     assert parameters(compiler.CompileResult._rebuild)[1:] == rebuilt
+    assert parameters(BaseFunction.get_call_type) == ["self", "context", "args", "kws"]
+    assert parameters(CPUContext.mangler) == ["self", "name", "types", "abi_tags", "uid"]
     assert parameters(CPUDispatcher.compile) == ["self", "sig"]
     assert parameters(CPUDispatcher.get_call_template) == ["self", "args", "kws"]
     inferred = ["typingctx", "targetctx", "interp", "args", "return_type", "locals"]
