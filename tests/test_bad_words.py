@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from baselines.cli.arguments import run_command
+from baselines.experiments import trials
 from benchmarks.proofs.world_samples import pgm
 from entropy_explore_env.settings.json import settings_of
 from entropy_explore_env.settings.scenarios import BOX
@@ -190,6 +191,7 @@ def test_words_that_a_command_cannot_use_are_refused(module, words, said, tmp_pa
     floor = tmp_path / "floor.pgm"
     floor.write_bytes(pgm(np.full((50, 60), 254, np.uint8)))
     (tmp_path / "mine.json").write_text(json.dumps(settings_of(BOX)))
+    monkeypatch.setattr(trials, "run_each", lambda *_, **__: pytest.fail("missions were run"))
     monkeypatch.chdir(tmp_path)
     before = set(tmp_path.rglob("*"))
     given = shlex.split(words.replace("FLOOR", str(floor)))
