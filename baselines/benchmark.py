@@ -134,11 +134,11 @@ def main(words: Sequence[str]) -> int:
 
     if args.archive is not None and not args.archive.is_file():
         raise SettingError("archive", str(args.archive), "a file that is there")
+    archives = [archive_of(args.out, suite.name), *([] if args.archive is None else [args.archive])]
+    known = [row for archive in archives for row in read_table(archive)]
     runs = args.runs or args.out / "runs"
     make_folder("out", args.out)
     make_folder("runs", runs)
-    archives = [archive_of(args.out, suite.name), *([] if args.archive is None else [args.archive])]
-    known = [row for archive in archives for row in read_table(archive)]
     started = time.monotonic()
     table = runs / f"{suite.name}.jsonl"
     if stop_after_s > 0.0:
