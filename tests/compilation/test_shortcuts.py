@@ -1,6 +1,7 @@
 """What Numba takes as a shortcut while kernels are compiled gives what it finds without."""
 
 import operator
+from typing import Any
 
 import pytest
 from numba.core import errors, types
@@ -9,7 +10,8 @@ from numba.core.registry import cpu_target
 from entropy_explore_env.compilation.numba_parts import BaseFunction
 from entropy_explore_env.compilation.shortcuts import shortcuts
 
-CONTEXT, TARGET = cpu_target.typing_context, cpu_target.target_context
+CPU: Any = cpu_target
+CONTEXT, TARGET = CPU.typing_context, CPU.target_context
 
 
 @pytest.mark.parametrize(
