@@ -7,13 +7,16 @@ from types import SimpleNamespace
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import ndimage
 
 from entropy_explore_env.frontiers.blocks import (
     CANDIDATE,
     COVERED,
+    DROPPED,
     NONE,
     UNEXPLORED,
     UNMAPPED,
+    mark_around,
     new_blocks,
     new_states,
 )
@@ -86,6 +89,43 @@ def test_candidates_and_rates_are_those_of_the_definition_after_every_change(sha
         patch = tuple(slice(max(i - 1, 0), i + 2) for i in here)
         precision[patch] += rng.choice([0.5, 9.0])
         mean[patch] = rng.choice([0.1, 0.9])
+
+
+def random_patch(shape, rng):
+    """Up to three voxels along each axis."""
+    low, wide = rng.integers(0, shape), rng.integers(1, 4, 3)
+    return tuple(slice(i, i + n) for i, n in zip(low, wide, strict=True))
+
+
+@given(st.sampled_from([(9, 6, 7), (5, 11, 8)]), st.sampled_from([1.0, 1.3, 2.0]), st.integers(2, 4), seeds)
+@drawn(10)
+def test_in_space_voxels_change_to_and_fro_and_edges_are_dropped_and_restored(shape, radius, spacing, seed):
+    """Free voxels become covered or unmapped and free again; all is counted anew beside it."""
+    rng = np.random.default_rng(seed)
+    frontiers = new_voxel_map(shape, radius, None, spacing)
+    blocks, ball = frontiers.blocks, frontiers.blocks.footprint.tolist()
+    body = np.zeros((2 * blocks.reach + 1,) * 3, int)
+    body[tuple((blocks.footprint + blocks.reach).T)] = 1
+    mean, precision = np.full(shape, 0.1, np.float32), np.full(shape, 9.0, np.float32)
+    dropped = np.zeros(shape, bool)
+    for _ in range(8):
+        patch, before = random_patch(shape, rng), dropped.copy()
+        mean[patch], precision[patch] = rng.choice([0.1, 0.9]), rng.choice([0.5, 2.0, 9.0])
+        dropped[random_patch(shape, rng)] = rng.random() < 0.7
+        blocks.flags[dropped.ravel()] |= DROPPED
+        blocks.flags[~dropped.ravel()] &= np.uint8(0xFF ^ DROPPED)
+        for voxel in np.flatnonzero(dropped != before):
+            mark_around(blocks, voxel, blocks.reach)
+        updated(frontiers, mean, precision)
+        state = state_of(mean, precision)
+        free = (state & (UNMAPPED | COVERED) == 0).astype(int)
+        touched = ndimage.correlate(free, body, mode="constant")
+        np.testing.assert_array_equal(blocks.free.reshape(shape), touched)
+        standing = np.isfinite(frontiers.traversal_cost.reshape(shape))
+        np.testing.assert_array_equal(standing, touched == len(ball))
+        wanted = reference.candidates(state, ball, dropped)
+        np.testing.assert_array_equal((blocks.flags & CANDIDATE > 0).reshape(shape), wanted)
+        check_blocks(frontiers, wanted, spacing)
 
 
 def check_blocks(frontiers, wanted, spacing):

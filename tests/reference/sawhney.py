@@ -33,14 +33,18 @@ def standing(state: np.ndarray, ball: Sequence[Sequence[int]]) -> np.ndarray:
     return found
 
 
-def candidates(state: np.ndarray, ball: Sequence[Sequence[int]]) -> np.ndarray:
-    """(X, Y, Z) bool: the body may stand there, and touches the edge of the explored."""
+def candidates(
+    state: np.ndarray, ball: Sequence[Sequence[int]], dropped: np.ndarray | None = None
+) -> np.ndarray:
+    """(X, Y, Z) bool: the body may stand there, and touches the edge of the explored that is not dropped."""
     flat = state.shape[2] == 1
     edge = np.zeros(state.shape, bool)
     for place in itertools.product(*map(range, state.shape)):
         if state[place] & (UNMAPPED | COVERED) == 0:
             beside = any(state[near] & UNEXPLORED for near in neighbours(place, state.shape, flat))
             edge[place] = bool(state[place] & UNEXPLORED) or beside
+    if dropped is not None:
+        edge &= ~dropped
     found = np.zeros(state.shape, bool)
     stands = standing(state, ball)
     for place in zip(*np.nonzero(stands), strict=True):
