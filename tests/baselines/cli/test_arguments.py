@@ -145,6 +145,12 @@ def test_words_that_do_not_fit_are_named_in_one_line_and_print_nothing(words, sa
     assert capsys.readouterr() == ("", "")
 
 
+@pytest.mark.parametrize("words", ["--name office", "--name=office", "--name"])
+def test_who_gives_a_value_that_stands_alone_by_an_option_is_told_how_to_write_it(words):
+    with pytest.raises(UsageError, match=rf"^{words.split()[0]}: no such option; its value .* NAME$"):
+        parse(Args, words.split())
+
+
 def test_a_value_that_is_not_allowed_is_the_settings_own_error():
     with pytest.raises(SettingError, match=r"Wheel.radius_m = -1.0"):
         parse(Args, ["--body.wheel.radius-m", "-1"])

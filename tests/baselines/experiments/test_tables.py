@@ -27,6 +27,8 @@ def test_rows_become_markdown_as_they_are():
 def test_a_table_for_the_terminal_keeps_the_lines_of_its_cells():
     lines = terminal_table(["a", "b"], [["42 s\n(39 … 44)", 1]]).splitlines()
     assert [line.split() for line in lines[2:]] == [["42", "s", "1"], ["(39", "…", "44)"]]
+    narrow = terminal_table(["a"], [["42 s\n(39 … 44)"]], 6).splitlines()
+    assert [line.split() for line in narrow[2:]] == [["42", "s"], ["(39", "…"], ["44)"]]
 
 
 def test_a_table_for_the_terminal_wraps_texts_and_leaves_numbers_as_they_are():

@@ -12,17 +12,17 @@ import pytest
 from baselines.experiments.origin import Origin
 from baselines.experiments.rows import Row
 from baselines.experiments.trials import CellTrial
-from baselines.suites.page import cite, shown, write_page
+from baselines.suites.page import cite, shown, tasks_table, write_page
 from baselines.suites.results import Results, failed_rows, overall_rows, results_of, task_rows
 from baselines.suites.suite import PATH, TIME, Place, Suite, Task
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import BOX
 
 
-def results_of_times(times: dict[str, list[list[float | str | None]]]) -> Results:
+def results_of_times(times: dict[str, list[list[float | str | None]]], robots: int = 2) -> Results:
     """Strategy → task → mission: seconds; None = cut off at 100 s; a word = failed for this reason."""
     names = [f"world-{number}" for number in range(len(times["random"]))]
-    limited = with_settings(BOX, {"time_limit_s": 100.0})
+    limited = with_settings(BOX, {"time_limit_s": 100.0, "robots": robots})
     tasks = tuple(Task(name, (Place(name, limited, len(times["random"][0])),)) for name in names)
     suite = Suite("own", "Mine", tasks, tuple(times))
     records = {}
@@ -38,6 +38,8 @@ def results_of_times(times: dict[str, list[list[float | str | None]]]) -> Result
                     "t_mission_s": 100.0 if time_s is None else time_s,
                     "t90_s": None if time_s is None else time_s / 2,
                     "distance_m": 7.0,
+                    "balance": 0.25,
+                    "bits_sent": 1500,
                     "joint": {"driven_m": 7.0},
                     "clock": {"decision_ms": 1.0, "worst_decision_ms": 3.0, "mission_s": 2.0},
                 }
@@ -139,6 +141,12 @@ def test_failures_of_one_reason_share_a_row():
 def test_a_page_where_all_failed_is_a_page(tmp_path):
     page = write_page(tmp_path, results_of_times({"random": [["Oops", "Oops"]]}), [], "the command")
     assert "| `random` | 0 of 2, 2 failed | > 100 |" in page.read_text()
+
+
+def test_tables_of_teams_show_how_even_the_work_was_and_what_was_sent():
+    team, alone = (tasks_table(results_of_times({"random": [[50.0]]}, robots)) for robots in (2, 1))
+    assert "| imbalance | bits sent |" in team and "| 0.25 | 1,500 |" in team
+    assert "imbalance" not in alone and "bits sent" not in alone
 
 
 def test_a_paper_cites_the_table_as_latex_and_csv_and_the_figure(tmp_path):
