@@ -22,15 +22,15 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str
 
 
 def terminal_table(head: Sequence[str], rows: Sequence[Sequence[object]], widest: int = 60) -> str:
-    """Return a table for people at a terminal; lines of a cell are kept, and wrapped where they are wide."""
+    """Return a table for people at a terminal; the lines of a cell are kept, and wide ones are wrapped."""
     heads = [textwrap.fill(text, _WIDEST_HEAD) for text in head]
     # Not by tabulate's maxcolwidths, which takes 1,204 for a number and fails to read it.
-    wrapped = [["\n".join(_wrapped(str(cell), widest)) for cell in row] for row in rows]
+    wrapped = [[_wrapped(str(cell), widest) for cell in row] for row in rows]
     return tabulate(wrapped, heads, "simple", disable_numparse=True)
 
 
-def _wrapped(text: str, widest: int) -> list[str]:
-    return [textwrap.fill(line, widest) for line in text.split("\n")]
+def _wrapped(text: str, widest: int) -> str:
+    return "\n".join(textwrap.fill(line, widest) for line in text.split("\n"))
 
 
 def latex_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
