@@ -258,8 +258,8 @@ def show(compared: dict[str, Any]) -> None:
         short = (cell.partition(" of ")[0].replace(" (", "\n(") for cell in (median, *others))
         rows.append([names[name], *short])
     print(terminal_table(["strategy", "mission time", "finished", "scans", "ratio", "faster"], rows))
-    print("mission time: median; ratio: the policy's median over the strategy's; 95 %")
-    print("intervals; faster: starts on which the policy was faster")
+    print("mission time: median; ratio: the policy's median over the strategy's, both with")
+    print("95 % intervals; faster: starts on which the policy was faster")
     there = {row["strategy"] for row in compared["rows"]}
     simple = [name for name in SIMPLE if name in there]
     if len(simple) > 1:

@@ -298,7 +298,7 @@ class DecisionLearner(PPOTorchLearner):
     """PPO's loss is RLlib's."""
 
     def configure_optimizers_for_module(self, module_id: str, config: Any = None) -> None:  # noqa: ANN401
-        """Make Adam as Stable-Baselines3 has it."""
+        """Register Adam with the settings that Stable-Baselines3 gives it."""
         module = self.module[module_id]
         parameters: Any = self.get_parameters(module)
         self.register_optimizer(
@@ -328,7 +328,7 @@ class DecisionLearner(PPOTorchLearner):
                 self._set_optimizer_lr(optimiser, rate)
 
     def after_gradient_based_update(self, *, timesteps: dict[str, Any]) -> None:
-        """Update the normalisation of observations by those that were learned from."""
+        """Update the normalisation of observations with those that were learned from."""
         super().after_gradient_based_update(timesteps=timesteps)
         for _, module in self._modules():
             module.learn_stats(self._advantages.learned)

@@ -103,7 +103,7 @@ def _given(options: Iterable[Option], words: Sequence[str]) -> dict[str, Any]:
 
 
 def _meant(word: str, options: Iterable[Option]) -> str:
-    """Return what a word that is no option probably means, with what comes before."""
+    """Return the end of the message about a word that is no option: what was probably meant."""
     flag = word.partition("=")[0]
     for option in options:
         if option.positional and flag == option.flag:

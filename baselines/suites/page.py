@@ -182,7 +182,7 @@ _TEAM_COLUMNS = {"balance": ("imbalance", ".2f"), "bits_sent": ("bits sent", ",.
 
 
 def tasks_table(results: Results) -> str:
-    """Return the table of tasks: of each what it is, and a row a strategy with medians over missions."""
+    """Return a table for each task, below a line about it: a row per strategy, with medians over missions."""
     measures = results.suite.measures
     head = ["strategy", "finished", *(measure.words for measure in measures), f"over `{results.reference}`"]
     teams = any(task.scenario.robots > 1 for task in results.tasks)

@@ -35,7 +35,7 @@ DROPPED = 8
 ROOM = 16
 """A robot may scan from here, and has not yet."""
 COUNTED_FREE = 32
-"""Counts as free in the cells in which a body touches it: see `Blocks.free`."""
+"""Mapped and free, and counted as such in `Blocks.free`."""
 _ALL_FLAGS = 63
 NONE = -1
 """In place of the number of a cell or voxel: there is none."""
@@ -126,8 +126,8 @@ class Blocks(NamedTuple):
     flags: np.ndarray
     """(N,) uint8: EDGE, CANDIDATE, EXCLUDED, DROPPED, ROOM, COUNTED_FREE."""
     free: np.ndarray
-    """(N,) uint16 or uint32, how many cells of the footprint in each cell are mapped and free; kept up to
-    date by others. (0,) in plans and layers, where footprints are small enough to look at them."""
+    """(N,) uint16 or uint32, how many of the cells that a body in each cell touches are mapped and free; kept
+    up to date by others. (0,) in plans and layers, where footprints are small enough to be looked through."""
     candidate: np.ndarray
     """(B,) int32, cell; NONE = no cell of the block is a CANDIDATE."""
     edges: np.ndarray
@@ -275,7 +275,7 @@ def choose_candidate(blocks, block):
 
 @lean_kernel
 def _edges_near(blocks, low, high):
-    """Return whether a block that a body touches from a cell between `low` and `high` holds an EDGE."""
+    """Return whether any block that a body touches from the cells of a span holds an EDGE, DROPPED or not."""
     rows = _blocks_along(blocks, 0, low[0], high[0], blocks.reach)
     columns = _blocks_along(blocks, 1, low[1], high[1], blocks.reach)
     layers = _blocks_along(blocks, 2, low[2], high[2], blocks.reach)

@@ -69,7 +69,7 @@ def update_voxels(states, blocks, cost, mean, precision, levels):
 
 @lean_kernel
 def _count_free(blocks, voxel):
-    """Count a voxel that is mapped free now, or no longer, in all voxels in which the body touches it."""
+    """Count a voxel that has become free, or is no longer, for all voxels from which a body touches it."""
     free = blocks.state[voxel] & (UNMAPPED | COVERED) == 0
     if free == (blocks.flags[voxel] & COUNTED_FREE > 0):
         return

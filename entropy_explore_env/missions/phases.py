@@ -82,7 +82,7 @@ def weigh_collected(localization, voxel_size_m, buffers, index, side, place, sca
 
 @lean_kernel
 def broadcast_all(team, maps, buffers, phases, time_s, tracer, scan, recipients):
-    """Let all robots broadcast, by number; where a phase ends their buffers change places before."""
+    """Let all robots broadcast, in the order of their numbers; at a phase's end buffers are swapped first."""
     repeats, robots = team.params[0].repeats, len(team.robots)
     if phases.broadcasts % repeats == repeats - 1:
         phases.collecting = 1 - phases.collecting

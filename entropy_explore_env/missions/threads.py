@@ -16,7 +16,7 @@ class Threads:
     """
 
     def __init__(self, count: int) -> None:
-        """Begin nothing yet."""
+        """Keep the number of threads; none is started yet."""
         self._count = count
         self._pool: ThreadPoolExecutor | None = None
         _ALL.add(self)

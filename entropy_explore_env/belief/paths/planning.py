@@ -115,7 +115,7 @@ def start_search(search, lattice, costs, sources):
 
 @inlined_kernel
 def _bits(mark, number, k):
-    """Return bit k thrice, where the voxel of a mark is passable; is not classified; has its final cost."""
+    """Return three masks with bit k set where a mark says passable, not classified yet, and final cost."""
     final = np.int64(mark & STEP != 0) & np.int64(mark & OPEN == 0)
     return np.int64(mark & KIND != IMPASSABLE) << k, np.int64(mark >> SEARCH_SHIFT != number) << k, final << k
 
@@ -157,6 +157,8 @@ def _neighbours(search, lattice, costs, voxel, x, y, z):
 @inlined_kernel
 def _relax_neighbours(search, lattice, costs, voxel, at, neighbours, query, max_cost):
     """Reach the neighbours of a voxel, at indices (x, y, z), through it where that is cheaper.
+
+    `neighbours` is what `_neighbours` returned of it.
 
     Returns:
         The largest cost that is still of interest: less than `max_cost` if the goal was reached.

@@ -73,7 +73,7 @@ def bhattacharya_office(grid: Grid, rng: np.random.Generator) -> World:
 
 
 def bhattacharya_cluttered(grid: Grid, rng: np.random.Generator) -> World:
-    """Make rooms within rooms, one or two doors in each wall, obstacles in all of them.
+    """Make rooms within rooms, with one or two doors in each wall and obstacles in all rooms.
 
     All free space in which a body of 0.3 m radius fits is connected; what it cannot reach is solid. Robots
     start anywhere in it, not only in the room in the lower left.

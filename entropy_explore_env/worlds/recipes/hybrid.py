@@ -22,7 +22,7 @@ _GATES = 2
 
 
 def hybrid(grid: Grid, rng: np.random.Generator) -> World:
-    """Make three kinds of world side by side, two gates of 1.2 m between each two of them."""
+    """Make three kinds of world side by side, with two gates of 1.2 m between neighbours."""
     require_size(grid, "a hybrid of three worlds", 20.0, 16.0)
     plan = bare_plan(grid.shape, grid.voxel_size_m)
     plan.solid[:] = True
