@@ -159,7 +159,7 @@ def new_blocks(
     return Blocks(
         state=state,
         flags=np.zeros(len(state), np.uint8),
-        free=np.zeros(counted, np.min_scalar_type(max(len(footprint), 256))),
+        free=np.zeros(counted, np.uint16 if len(footprint) < 1 << 16 else np.uint32),
         candidate=np.full(math.prod(blocks), NONE, np.int32),
         edges=np.zeros(math.prod(blocks), np.uint8),
         dirty=np.zeros(math.prod(blocks), np.uint8),

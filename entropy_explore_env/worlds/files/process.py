@@ -221,7 +221,7 @@ def _size(path: Path | str) -> int:
         raise WorldError("world file", str(path), "a file that exists")
     size = path.stat().st_size
     if size > MAX_FILE_BYTES:
-        raise WorldError("world file", str(path), f"at most {MAX_FILE_BYTES >> 20} MiB")
+        raise WorldError("world file", str(path), f"at most {MAX_FILE_BYTES >> 30} GiB")
     return size
 
 

@@ -131,7 +131,7 @@ def content(path: Path) -> bytes:
     if not path.is_file():
         raise RefusedError(f"a map whose file {path.name} exists")
     if path.stat().st_size > MAX_FILE_BYTES:
-        raise RefusedError(f"a map whose file {path.name} has at most {MAX_FILE_BYTES >> 20} MiB")
+        raise RefusedError(f"a map whose file {path.name} has at most {MAX_FILE_BYTES >> 30} GiB")
     return path.read_bytes()
 
 
