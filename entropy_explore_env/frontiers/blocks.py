@@ -173,25 +173,33 @@ def new_blocks(
 
 
 @inlined_kernel
-def _blocks_along(blocks, axis, low, high, radius):
-    """Return the first block along an axis within `radius` of some cells, and one past the last.
+def _blocks_near(blocks, low, high, radius):
+    """Return (first, last): block indices within `radius` of a span of cells; `last` is one past them.
 
-    The cells are those from `low` up to but without `high`.
+    The span leads from the cell `low` up to but without `high`, along every axis.
     """
-    across = blocks.across[axis]
-    return max(low - radius, 0) // across, min(high - 1 + radius, blocks.size[axis] - 1) // across + 1
+    size, across = blocks.size, blocks.across
+    first = (
+        max(low[0] - radius, 0) // across[0],
+        max(low[1] - radius, 0) // across[1],
+        max(low[2] - radius, 0) // across[2],
+    )
+    last = (
+        min(high[0] - 1 + radius, size[0] - 1) // across[0] + 1,
+        min(high[1] - 1 + radius, size[1] - 1) // across[1] + 1,
+        min(high[2] - 1 + radius, size[2] - 1) // across[2] + 1,
+    )
+    return first, last
 
 
 @lean_kernel
 def mark_around(blocks, cell, radius):
     """Let the blocks with a cell within `radius` along every axis be updated next time."""
     x, y, z = grid_index(blocks.size, cell)
-    rows = _blocks_along(blocks, 0, x, x + 1, radius)
-    columns = _blocks_along(blocks, 1, y, y + 1, radius)
-    layers = _blocks_along(blocks, 2, z, z + 1, radius)
-    for i in range(rows[0], rows[1]):
-        for j in range(columns[0], columns[1]):
-            for k in range(layers[0], layers[1]):
+    first, last = _blocks_near(blocks, (x, y, z), (x + 1, y + 1, z + 1), radius)
+    for i in range(first[0], last[0]):
+        for j in range(first[1], last[1]):
+            for k in range(first[2], last[2]):
                 blocks.dirty[flat_index(blocks.blocks, i, j, k)] = 1
 
 
@@ -276,12 +284,10 @@ def choose_candidate(blocks, block):
 @lean_kernel
 def _edges_near(blocks, low, high):
     """Return whether any block that a body touches from the cells of a span holds an EDGE, DROPPED or not."""
-    rows = _blocks_along(blocks, 0, low[0], high[0], blocks.reach)
-    columns = _blocks_along(blocks, 1, low[1], high[1], blocks.reach)
-    layers = _blocks_along(blocks, 2, low[2], high[2], blocks.reach)
-    for i in range(rows[0], rows[1]):
-        for j in range(columns[0], columns[1]):
-            for k in range(layers[0], layers[1]):
+    first, last = _blocks_near(blocks, low, high, blocks.reach)
+    for i in range(first[0], last[0]):
+        for j in range(first[1], last[1]):
+            for k in range(first[2], last[2]):
                 if blocks.edges[flat_index(blocks.blocks, i, j, k)]:
                     return True
     return False
