@@ -51,7 +51,7 @@ class MoveAndGaze(CategoricalDistribution):
 
     @distribution.setter
     def distribution(self, value: None) -> None:
-        """Ignore the value: Stable-Baselines3 sets None at first; there is nothing to set."""
+        """Ignore the None that Stable-Baselines3 assigns first: the distribution follows from the scores."""
 
     def log_prob(self, actions: torch.Tensor) -> torch.Tensor:
         """Return (N,) logarithms of the probabilities of actions (N,)."""
