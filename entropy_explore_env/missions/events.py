@@ -12,7 +12,7 @@ from typing import NamedTuple
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.faults import next_stop, stops_counted
 from entropy_explore_env.missions.messages import next_message
-from entropy_explore_env.missions.phases import next_broadcast
+from entropy_explore_env.missions.phases import broadcasts_made, next_broadcast
 
 NO_EVENT, MESSAGE_ARRIVES, BROADCAST_DUE, ROBOT_DUE, ROBOT_STOPS = range(5)
 """Kinds of events."""
@@ -38,7 +38,7 @@ def next_event(shared, robots, messages, phases, faults):
     broadcast of all robots; then robots by number.
     """
     slot, due_s = next_message(messages)
-    broadcast_s = next_broadcast(shared, phases)
+    broadcast_s = next_broadcast(phases, shared.phase_s)
     robot, robot_s = next_robot(robots)
     stopping, stopping_s = next_stop(faults)
     soonest_s = min(due_s, broadcast_s, robot_s, stopping_s)
@@ -78,7 +78,7 @@ def events_handled(robots, messages, phases, faults):
     that could decide, and set when it decides next: it counts for more than these three. So does a stop,
     after which a robot does not decide. Arguments as those of `next_event`.
     """
-    handled = phases.broadcasts + 4 * stops_counted(faults)
+    handled = broadcasts_made(phases) + 4 * stops_counted(faults)
     for robot in robots:
         handled += 4 * robot.scans + int(robot.deciding) + int(math.isinf(robot.redecide_s))
     for message in messages:

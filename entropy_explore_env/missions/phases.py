@@ -4,11 +4,16 @@ What a robot selects from its scans goes into its collecting buffer. When a phas
 places: the one that was filled is broadcast, at once and again evenly spread over the next phase, so that a
 lost message is made up for; a teammate that has it already ignores it. All of a phase's batches share the
 fate of a broadcast.
+
+Where batches are sent at once `TeamPhases` is None, and nothing of all this is compiled.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import ASSERTING, lean_kernel
@@ -35,89 +40,140 @@ _MISSING, _HAS_IT, _AGAIN, _NOW = 0, 1, 2, 3
 """What a teammate has of a broadcast: nothing; all; all, and hears it again; nothing, but hears it now."""
 
 
+class TeamPhases(NamedTuple):
+    """The buffers of one mission's robots, and which phase it is: slices of MissionState."""
+
+    repeats: int
+    """How often a batch is broadcast in a phase."""
+    now: np.ndarray
+    """(1,) PHASES."""
+    counts: np.ndarray
+    """(A, 2) int64, batches in each of a robot's two buffers."""
+    batches: np.ndarray
+    """(A, 2, S) BATCH."""
+    rays: np.ndarray
+    """(A, 2, S, B, 5) float64."""
+    heard: np.ndarray
+    """(A, A) int8."""
+    covariances: np.ndarray
+    """(A, 2, S, 10) float64."""
+
+
 @lean_kernel
-def next_broadcast(params, phases):
+def phases_of(repeats, state, mission):
+    """Return the TeamPhases of a mission; None where batches are sent at once."""
+    if repeats is None:  # known while compiling: nothing of the rest is compiled
+        return None
+    return TeamPhases(
+        repeats,
+        state.phases[mission : mission + 1],
+        state.phase_counts[mission],
+        state.phase_batches[mission],
+        state.phase_rays[mission],
+        state.phase_heard[mission],
+        state.phase_covariances[mission],
+    )
+
+
+@lean_kernel
+def next_broadcast(phases, phase_s):
     """Return when the robots broadcast next; inf where batches are sent at once."""
-    if params.phase_s == 0.0:
+    if phases is None:  # known while compiling: nothing of the rest is compiled
         return math.inf
-    return (phases.broadcasts + 1) * (params.phase_s / params.repeats)
+    return (phases.now[0].broadcasts + 1) * (phase_s / phases.repeats)
 
 
 @lean_kernel
-def collect_batch(team, buffers, phases, scan, index, count):
-    """Put `count` measurements of `scan.order` into a robot's collecting buffer.
+def broadcasts_made(phases):
+    """Return the number of broadcasts so far; 0 where batches are sent at once."""
+    if phases is None:  # known while compiling: nothing of the rest is compiled
+        return 0
+    return phases.now[0].broadcasts
+
+
+@lean_kernel
+def collect_batch(phases, team, scan, index, count):
+    """Put `count` measurements of `scan.order` into a robot's collecting buffer, if batches go out in phases.
 
     It has room in every mission, see `Scenario.phase_batches`; a state from outside may have none left.
+
+    Returns:
+        Whether batches go out in phases.
     """
-    side = phases.collecting
-    place = buffers.counts[index, side]
-    if ASSERTING and place == buffers.batches.shape[2]:
+    if phases is None:  # known while compiling: nothing of the rest is compiled
+        return False
+    side = phases.now[0].collecting
+    place = phases.counts[index, side]
+    if ASSERTING and place == phases.batches.shape[2]:
         raise AssertionError("no room is left for a batch")
-    if place == buffers.batches.shape[2]:
-        return
-    batch = buffers.batches[index, side, place]
+    if place == phases.batches.shape[2]:
+        return True
+    batch = phases.batches[index, side, place]
     copy_numbers(believed_scan_pose(team.localization, team.robots[index], index), batch.pose, 5)
-    collect_covariance(team.localization, buffers, index, side, place)
+    collect_covariance(team.localization, phases, index, side, place)
     batch.count = count
-    pack_measurements(scan, count, buffers.rays[index, side, place])
-    buffers.counts[index, side] = place + 1
+    pack_measurements(scan, count, phases.rays[index, side, place])
+    phases.counts[index, side] = place + 1
+    return True
 
 
 @lean_kernel
-def collect_covariance(localization, buffers, index, side, place):
+def collect_covariance(localization, phases, index, side, place):
     """Put the covariance of a robot's latest scan beside the batch at a place of its buffer."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return
-    note_covariance(localization, index, buffers.covariances[index, side], place)
+    note_covariance(localization, index, phases.covariances[index, side], place)
 
 
 @lean_kernel
-def weigh_collected(localization, voxel_size_m, buffers, index, side, place, scan):
+def weigh_collected(localization, voxel_size_m, phases, index, side, place, scan):
     """Lower the precision of a collected batch's measurements, unpacked into `scan`, by its covariance."""
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return
-    count, covariances = buffers.batches[index, side, place].count, buffers.covariances[index, side]
+    count, covariances = phases.batches[index, side, place].count, phases.covariances[index, side]
     weigh_batch(localization, covariances, place, scan, count, voxel_size_m)
 
 
 @lean_kernel
-def broadcast_all(team, maps, buffers, phases, time_s, tracer, scan, recipients):
+def broadcast_all(phases, team, maps, time_s, tracer, scan, recipients):
     """Let all robots broadcast, in the order of their numbers; at a phase's end buffers are swapped first."""
-    repeats, robots = team.params[0].repeats, len(team.robots)
-    if phases.broadcasts % repeats == repeats - 1:
-        phases.collecting = 1 - phases.collecting
+    if phases is None:  # known while compiling: nothing of the rest is compiled
+        return
+    now, repeats, robots = phases.now[0], phases.repeats, len(team.robots)
+    if now.broadcasts % repeats == repeats - 1:
+        now.collecting = 1 - now.collecting
         for robot in range(robots):
-            buffers.counts[robot, phases.collecting] = 0
+            phases.counts[robot, now.collecting] = 0
             for mate in range(robots):
-                buffers.heard[robot, mate] = _MISSING
-    phases.broadcasts += 1
-    side = 1 - phases.collecting
+                phases.heard[robot, mate] = _MISSING
+    now.broadcasts += 1
+    side = 1 - now.collecting
     for robot in range(robots):
-        if buffers.counts[robot, side] > 0 and not switched_off(team.faults, robot, time_s):
-            broadcast(team, maps, buffers, side, robot, time_s, tracer, scan, recipients)
+        if phases.counts[robot, side] > 0 and not switched_off(team.faults, robot, time_s):
+            broadcast(phases, team, maps, side, robot, time_s, tracer, scan, recipients)
 
 
 @lean_kernel
-def broadcast(team, maps, buffers, side, index, time_s, tracer, scan, recipients):
+def broadcast(phases, team, maps, side, index, time_s, tracer, scan, recipients):
     """Send a robot's buffer; teammates that do not have it yet fuse it.
 
     Args:
-        side: Which of its two buffers.
+        side: Which of its two phases.
     """
     robots, robot, params = team.robots, team.robots[index], team.params
-    batches, heard = buffers.counts[index, side], buffers.heard[index]
+    batches, heard = phases.counts[index, side], phases.heard[index]
     here = pose_at(params[index], robot, time_s)
     said = believed_pose(estimate_of(team.localization, index), params[index], here)
-    bits = buffer_bits(team.localization, buffers.batches[index, side], batches)
+    bits = buffer_bits(team.localization, phases.batches[index, side], batches)
     transmit(team, index, point(here), time_s, batches, recipients)
     for mate in range(len(robots)):
         if recipients[mate] and takes_in(team.faults, robots[mate], mate, time_s, bits):
             heard[mate] = _AGAIN if heard[mate] == _HAS_IT else _NOW
     for place in range(batches):
-        batch = buffers.batches[index, side, place]
+        batch = phases.batches[index, side, place]
         batch_bits = message_bits(team.localization, batch.count)
         count_sent(robot, batch.count, batch_bits)
-        packed, traced = buffers.rays[index, side, place], False
+        packed, traced = phases.rays[index, side, place], False
         for mate in range(len(robots)):
             if heard[mate] == _AGAIN:
                 robots[mate].messages_received += 1
@@ -126,7 +182,7 @@ def broadcast(team, maps, buffers, side, index, time_s, tracer, scan, recipients
                 if not traced:
                     unpack_measurements(params[0], tracer, index, scan, batch.pose, packed, batch.count)
                     weigh_collected(
-                        team.localization, params[0].voxel_size_m, buffers, index, side, place, scan
+                        team.localization, params[0].voxel_size_m, phases, index, side, place, scan
                     )
                     traced = True
                 note_message(robots[mate], team.heard[mate, index], said, time_s, batch.count, batch_bits)

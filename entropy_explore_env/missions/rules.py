@@ -62,7 +62,6 @@ PARAMS = record_type(
         ("delay_s", "f8"),
         ("announcements", "?"),
         ("phase_s", "f8"),
-        ("repeats", "i8"),
         ("summary_every_s", "f8"),  # 0 where no summaries are sent
         ("summary_threshold_bits", "f8"),
         ("period_s", "f8"),  # length of a step; inf = until the next robot has to decide
@@ -107,6 +106,8 @@ class Rules(NamedTuple):
     """(A,) FAULT_PARAMS; None = nothing goes wrong."""
     localization: np.ndarray | None
     """(A,) LOCALIZATION_PARAMS; None = all robots know where they are."""
+    repeats: int | None
+    """How often a batch is broadcast in a phase; None = batches are sent at once."""
 
 
 def rules_of(scenario: Scenario) -> Rules:
@@ -136,7 +137,6 @@ def rules_of(scenario: Scenario) -> Rules:
         "delay_s": channel.delay_s,
         "announcements": channel.announcements,
         "phase_s": channel.phase_s,
-        "repeats": channel.repeats,
         "summary_every_s": channel.summary_every_s if scenario.shares_summaries else 0.0,
         "summary_threshold_bits": channel.summary_threshold_bits,
         "period_s": math.inf if scenario.decision_period_s is None else scenario.decision_period_s,
@@ -179,6 +179,7 @@ def rules_of(scenario: Scenario) -> Rules:
         panorama=panorama_directions(scenario),
         faults=fault_params(scenario),
         localization=localization_params(scenario),
+        repeats=channel.repeats if channel.phase_s > 0.0 else None,
     )
 
 

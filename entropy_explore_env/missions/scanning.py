@@ -106,10 +106,8 @@ def share(mission, scan, sensor, index, recipients):
     if share_by_need(team.backlog, mission, scan, sensor, index, recipients):
         return
     count = select_measurements(scan.utility, params.burst, robot.i_min_bits, scan.order)
-    if count > 0 and params.phase_s == 0.0:
+    if count > 0 and not collect_batch(mission.phases, team, scan, index, count):
         send_batch(team, mission.maps, clock, in_flight, scan, index, count, recipients)
-    elif count > 0:
-        collect_batch(team, mission.buffers, mission.phases, scan, index, count)
 
 
 @lean_kernel

@@ -180,21 +180,6 @@ class InFlight(NamedTuple):
     """(Q, 10) float64."""
 
 
-class PhaseBuffers(NamedTuple):
-    """The buffers of one mission's broadcast in phases: slices of MissionState."""
-
-    counts: np.ndarray
-    """(A, 2) int64."""
-    batches: np.ndarray
-    """(A, 2, S) BATCH."""
-    rays: np.ndarray
-    """(A, 2, S, B, 5) float64."""
-    heard: np.ndarray
-    """(A, A) int8."""
-    covariances: np.ndarray
-    """(A, 2, S, 10) float64."""
-
-
 class StateArray(NamedTuple):
     """What an array of the state is like."""
 

@@ -34,13 +34,13 @@ from entropy_explore_env.missions.faults import faults_of, note_stop
 from entropy_explore_env.missions.localization import estimate_of, localization_of, note_motion
 from entropy_explore_env.missions.messages import Maps, Team, Tracer, announce, receive
 from entropy_explore_env.missions.own_maps import summaries_of
-from entropy_explore_env.missions.phases import broadcast_all
+from entropy_explore_env.missions.phases import TeamPhases, broadcast_all, phases_of
 from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.redecision import decide, note_braking
 from entropy_explore_env.missions.reward import reward_robots
 from entropy_explore_env.missions.scanning import scan_and_share
 from entropy_explore_env.missions.scoring import note_progress
-from entropy_explore_env.missions.state import Beliefs, InFlight, JointMap, LatestScans, PhaseBuffers
+from entropy_explore_env.missions.state import Beliefs, InFlight, JointMap, LatestScans
 from entropy_explore_env.missions.summaries import receive_summary
 from entropy_explore_env.robots.channel import Air
 from entropy_explore_env.robots.range_sensor import sensor_of
@@ -59,9 +59,8 @@ class Mission(NamedTuple):
     joint: JointMap
     latest: LatestScans
     in_flight: InFlight
-    phases: np.record
-    """PHASES."""
-    buffers: PhaseBuffers
+    phases: TeamPhases | None
+    """None = batches are sent at once: nothing else is compiled."""
     truth: np.ndarray
     """(V,) float32."""
 
@@ -92,14 +91,7 @@ def step_missions(rules, state, choices, work, continuous, discrete, first, last
                 state.in_flight_rays[m],
                 state.in_flight_covariances[m],
             ),
-            state.phases[m],
-            PhaseBuffers(
-                state.phase_counts[m],
-                state.phase_batches[m],
-                state.phase_rays[m],
-                state.phase_heard[m],
-                state.phase_covariances[m],
-            ),
+            phases_of(rules.repeats, state, m),
             state.truth[m],
         )
         clock, team = mission.clock, mission.team
@@ -182,8 +174,7 @@ def advance(mission, sensors, work):
             if not receive_summary(team.summaries, team, maps, mission.in_flight, event.number):
                 receive(team, maps, mission.in_flight, event.number, tracer, scan)
         elif event.kind == BROADCAST_DUE:
-            buffers, phases = mission.buffers, mission.phases
-            broadcast_all(team, maps, buffers, phases, clock.time_s, tracer, scan, work.recipients)
+            broadcast_all(mission.phases, team, maps, clock.time_s, tracer, scan, work.recipients)
         elif event.kind == ROBOT_STOPS:
             until_s = note_stop(team.faults, event.number)
             note_motion(

@@ -10,13 +10,20 @@ import pytest
 
 from entropy_explore_env.missions.events import events_handled, next_event
 from entropy_explore_env.missions.faults import TeamFaults
-from entropy_explore_env.missions.records import FAULT, MESSAGE, PHASES, ROBOT
+from entropy_explore_env.missions.phases import phases_of
+from entropy_explore_env.missions.records import FAULT, MESSAGE, ROBOT
 from entropy_explore_env.missions.rules import PARAMS
 from entropy_explore_env.robots.faults import FAULT_PARAMS
 from tests.reference.scenes import free_box, started
 
 NOTHING, MESSAGES, BROADCAST, ROBOTS, STOPS = range(5)
 NEVER = math.inf
+
+
+def in_phases(repeats):
+    """The phases of a mission in which so far nothing was collected."""
+    state = started(free_box(robots=3, channel={"phase_s": 6.0, "repeats": repeats})).state
+    return phases_of(repeats, state, 0)
 
 
 def event(due_s=(), serials=None, broadcasts=None, scans_s=(), deciding=(), stops_s=None, stopped=()):
@@ -26,16 +33,17 @@ def event(due_s=(), serials=None, broadcasts=None, scans_s=(), deciding=(), stop
     messages["due_s"][: len(due_s)], robots["next_scan_s"][: len(scans_s)] = due_s, scans_s
     messages["serial"] = range(3) if serials is None else serials
     robots["deciding"][list(deciding)] = True
-    shared, phases = np.zeros(1, PARAMS), np.zeros(1, PHASES)
+    shared, phases = np.zeros(1, PARAMS), None
     if broadcasts is not None:
-        shared["phase_s"], shared["repeats"], phases["broadcasts"] = 6.0, 3, broadcasts
+        shared["phase_s"], phases = 6.0, in_phases(3)
+        phases.now["broadcasts"] = broadcasts
     faults = None
     if stops_s is not None:
         faults = TeamFaults(np.zeros(4, FAULT_PARAMS), np.zeros(4, FAULT))
         faults.states["stop_s"] = NEVER
         faults.states["stop_s"][: len(stops_s)] = stops_s
         faults.states["stopped"][list(stopped)] = True
-    return tuple(next_event(shared[0], robots, messages, phases[0], faults))
+    return tuple(next_event(shared[0], robots, messages, phases, faults))
 
 
 @pytest.mark.parametrize(
@@ -107,9 +115,9 @@ def test_every_kind_of_event_counts_as_handled():
     state = missions.state
 
     def handled():
-        return events_handled(state.robots[0], state.in_flight[0], state.phases[0], faults)
+        return events_handled(state.robots[0], state.in_flight[0], phases, faults)
 
-    faults = None
+    faults, phases = None, in_phases(2)
 
     begun = handled()
     assert begun == 6  # all decide, and will not under way
@@ -117,7 +125,7 @@ def test_every_kind_of_event_counts_as_handled():
     assert handled() == begun - 2
     state.in_flight["due_s"][0, 1] = NEVER  # heard
     assert handled() == begun - 1
-    state.phases["broadcasts"][0] += 1
+    phases.now["broadcasts"] += 1
     assert handled() == begun
     state.robots["scans"][0, 2] += 1
     state.in_flight["due_s"][0, 1] = 5.0  # a scan of which something is sent …
