@@ -11,11 +11,13 @@ from __future__ import annotations
 import gc
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from typing import IO, Any
 
+from numba.extending import lower_cast
+
 from entropy_explore_env.compilation import announcement, cache, second_process
-from entropy_explore_env.compilation.folder import claim, kernel_folder, release
+from entropy_explore_env.compilation.folder import ClaimedError, claim, kernel_folder, release
 from entropy_explore_env.compilation.libraries import InnerLowering, OuterLowering, rebuilt_inner
 from entropy_explore_env.compilation.numba_parts import (
     UNUSED_PASSES,
@@ -37,7 +39,7 @@ from entropy_explore_env.compilation.stamps import forget_digests
 
 _WRAPPERS = {"no_cfunc_wrapper": True}
 _NO_WRAPPERS = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
-_WORTH_DIVIDING = 10
+_WORTH_DIVIDING = 20
 """Trees of at least this many kernels are compiled by two processes: to divide the work costs time, too.
 
 Whatever calls a tree that is divided has to be divided, too: until the outermost inference ends, Numba keeps
@@ -55,6 +57,9 @@ class _Compiling:
         come, so that code from another process may bear the number of another function of this one."""
         self.path = form.disk.path_of(self.name)
         self.claim: IO[bytes] | None = None
+        self.callees_only = False
+        self.waits, _state.waits = _state.waits, True
+        """Whether to wait while another process compiles it."""
 
 
 class _State(threading.local):
@@ -62,6 +67,8 @@ class _State(threading.local):
 
     def __init__(self) -> None:
         self.kernels: list[_Compiling] = []
+        self.waits = True
+        """Whether what is compiled next waits while another process compiles it."""
         self.found: dict[tuple[InnerKernel, tuple[types.Type, ...]], None] | None = None
 
 
@@ -70,6 +77,10 @@ _state = _State()
 
 class _CompiledElsewhereError(Exception):
     """Another process has just compiled the kernel; holds what it wrote."""
+
+
+class _CalleesCompiledError(Exception):
+    """What a kernel calls is compiled, and no more was asked for."""
 
 
 @contextmanager
@@ -83,7 +94,7 @@ def _compiling(form: _Form, sig: Any) -> Iterator[_Compiling]:  # noqa: ANN401 -
     if outermost:
         forget_digests()
         form.targetctx.refresh()
-    if any(compiling.form.py_func is form.py_func for compiling in _state.kernels):
+    if _calls_itself(form):
         raise errors.TypingError(
             f"kernel {form.py_func.__qualname__} calls itself; Numba's own njit allows that"
         )
@@ -101,6 +112,16 @@ def _compiling(form: _Form, sig: Any) -> Iterator[_Compiling]:  # noqa: ANN401 -
         release(compiling.claim)
         if collecting:
             gc.enable()
+
+
+def _calls_itself(form: _Form) -> bool:
+    """Return whether a kernel is being compiled for its own sake; others may wait while its turn comes."""
+    for compiling in reversed(_state.kernels):
+        if compiling.form.py_func is form.py_func:
+            return True
+        if compiling.callees_only:
+            return False
+    return False
 
 
 class KernelCompiler(compiler.Compiler):
@@ -143,7 +164,11 @@ class InnerKernelCompiler(KernelCompiler):
 
 @register_pass(mutates_CFG=False, analysis_only=True)
 class CalleesFirst(AnalysisPass):
-    """Compiles the kernels that one calls, and then claims it, so that processes share the work."""
+    """Compiles the kernels that one calls, and then claims it, so that processes share the work.
+
+    Another process may be at any of them. Then this one goes on with the next, in the end with what the other
+    kernels call that were asked for, and comes back. Only what is left then is waited for.
+    """
 
     _name = "callees_first"
 
@@ -152,22 +177,48 @@ class CalleesFirst(AnalysisPass):
         super().__init__()
 
     def run_pass(self, state: Any) -> bool:  # noqa: ANN401 - Numba's bag of everything
-        """Go through the calls whose types are known, again while there are new ones."""
-        compiling, tried = _state.kernels[-1], set()
-        divided = second_process.shared() and compiling.tree_size >= _WORTH_DIVIDING
-        while divided and (calls := [call for call in _survey(state) if call not in tried]):
-            tried.update(calls)
-            for kernel, args in reversed(calls) if second_process.serves() else calls:
-                try:
-                    kernel.compile(args)
-                except errors.NumbaError:  # the types may not be the last word; if they are, it is met again
-                    continue
+        """Compile the kernels that are called, what another process compiles at the moment last."""
+        compiling = _state.kernels[-1]
+        if second_process.shared() and compiling.tree_size >= _WORTH_DIVIDING:
+            left = _compile_callees(state, waits=False)
+            if len(_state.kernels) == 1 and not compiling.callees_only:
+                for kernel, args in second_process.not_begun():
+                    if kernel is not compiling.form:
+                        kernel.compile_callees(args)
+            if left and not compiling.waits:
+                raise ClaimedError
+            if left:
+                _compile_callees(state, waits=True)
+        if compiling.callees_only:
+            raise _CalleesCompiledError
         if compiling.path is not None:
-            compiling.claim = claim(compiling.path)
+            compiling.claim = claim(compiling.path, waits=compiling.waits)
             written = cache.load(compiling.path, compiling.sig)
             if written is not None:
                 raise _CompiledElsewhereError(written)
         return False
+
+
+def _compile_callees(state: Any, *, waits: bool) -> bool:  # noqa: ANN401 - as above
+    """Compile the kernels that are called with known types, again while there are new ones.
+
+    Returns:
+        Whether some are left, because another process compiles them and this one is not to wait.
+    """
+    tried, left = set(), False
+    while calls := [call for call in _survey(state) if call not in tried]:
+        tried.update(calls)
+        for kernel, args in reversed(calls) if second_process.serves() else calls:
+            _state.waits = waits
+            try:
+                kernel.compile(args)
+            except errors.NumbaError:  # the types may not be the last word; if they are, it is met again
+                continue
+            except ClaimedError:
+                left = True
+            finally:
+                _state.waits = True
+    return left
 
 
 def _survey(state: Any) -> list[tuple[InnerKernel, tuple[types.Type, ...]]]:  # noqa: ANN401 - as above
@@ -238,6 +289,26 @@ class _Form(CPUDispatcher):
         raise NotImplementedError
 
 
+def _general(kind: types.Type) -> types.Type:
+    """Return the type for which a kernel is compiled that is called with another one.
+
+    Constants, short integers and fields of records have types of their own. Each would be compiled apart,
+    into code that does the same.
+    """
+    kind = types.unliteral(kind)
+    if isinstance(kind, types.NestedArray):
+        return types.Array(kind.dtype, kind.ndim, kind.layout)
+    if kind in types.signed_domain:
+        return types.int64
+    return kind
+
+
+@lower_cast(types.NestedArray, types.Array)
+def _field_to_array(context: Any, builder: Any, source: Any, target: Any, value: Any) -> Any:  # noqa: ANN401
+    """Return a field of a record as an array: Numba holds both in the same form."""
+    return value
+
+
 class InnerKernel(_Form):
     """A kernel as other kernels call it."""
 
@@ -253,7 +324,8 @@ class InnerKernel(_Form):
         return False
 
     def get_call_template(self, args: Any, kws: Any) -> Any:  # noqa: ANN401 - types of arguments
-        """As Numba's; a survey only notes what would have to be compiled."""
+        """As Numba's, for general types; a survey only notes what would have to be compiled."""
+        args = tuple(map(_general, args))
         if _state.found is not None:
             folded = tuple(self._compiler.fold_argument_types(args, kws)[1])
             if not self.is_ready(folded):
@@ -293,6 +365,14 @@ class Kernel(_Form):
     def _numba_type_(self) -> types.Type:
         """What other kernels take it for: the inner form."""
         return self.inner._numba_type_
+
+    def compile_callees(self, args: tuple[types.Type, ...]) -> None:
+        """Compile the kernels that this one calls for some types, as far as they are not on disk."""
+        with global_compiler_lock, suppress(errors.NumbaError), _compiling(self, args) as compiling:
+            compiling.callees_only, compiling.waits = True, False
+            if cache.load(compiling.path, args) is None:
+                with suppress(_CalleesCompiledError, ClaimedError):
+                    self._compiler.compile(args, None)
 
     def _result(self, compiling: _Compiling, args: Any, return_type: Any) -> compiler.CompileResult:  # noqa: ANN401
         """As of every form; says so, and lets the helper take part."""

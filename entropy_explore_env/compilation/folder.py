@@ -46,14 +46,21 @@ def kernel_folder() -> Path | None:
     return found if found.is_absolute() else None
 
 
-def claim(kernel: Path) -> IO[bytes] | None:
-    """Wait until no other process compiles a kernel, given by its file, and claim it.
+class ClaimedError(Exception):
+    """Another process compiles the kernel."""
+
+
+def claim(kernel: Path, *, waits: bool = True) -> IO[bytes] | None:
+    """Claim a kernel, given by its file, once no other process compiles it.
 
     A claim is a lock on a file beside the kernel's own. The system lets go of it when its process ends.
 
     Returns:
         What `release` takes; None where there are no such locks, where the folder cannot be written, or where
         others keep the claim for too long.
+
+    Raises:
+        ClaimedError: Another process has claimed it, and this one is not to wait.
     """
     if fcntl is None:
         return None
@@ -67,6 +74,8 @@ def claim(kernel: Path) -> IO[bytes] | None:
                 opened.pop_all()  # it stays open
                 return held
             except BlockingIOError:
+                if not waits:
+                    raise ClaimedError from None
                 time.sleep(_PAUSE_S)
     return None
 

@@ -21,12 +21,19 @@ from entropy_explore_env.compilation.numba_parts import (
 class InnerLibrary(JITCodeLibrary):
     """The intermediate code of an inner kernel and of all that it calls: not translated.
 
-    It is simplified function by function, and optimised with the outermost kernel. Inlined kernels, the
-    innermost loops, are optimised before that, too: code that was optimised once traces rays 10 % slower.
+    It is simplified a little, function by function, and optimised with the outermost kernel. Inlined kernels,
+    the innermost loops, are optimised before that, too: code that was optimised once traces rays 10 % slower.
     """
 
     optimised = False
     """Whether it is an inlined kernel."""
+
+    def _optimize_functions(self, ll_module: Any) -> None:  # noqa: ANN401 - of LLVM
+        """Simplify functions at the lowest level; the rest is done to the outermost kernel anyway."""
+        ll_module.data_layout = self.codegen._data_layout
+        builder = llvm.create_pass_builder(self.codegen._tm, llvm.create_pipeline_tuning_options(1))
+        for function in _defined(ll_module.functions):
+            builder.getFunctionPassManager().run(function, builder)
 
     def enable_object_caching(self) -> None:
         """There is no object code."""

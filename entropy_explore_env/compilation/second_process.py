@@ -2,8 +2,9 @@
 
 Both are given the same kernels. This one goes through the kernels that each of them calls from the first to
 the last, the helper from the last to the first; what one has compiled the other finds on disk, and they meet
-in the middle. The helper starts only when a step's kernels are not on disk. It ends with this process,
-or when it has had nothing to do for a while.
+in the middle. A kernel that Python calls is translated as a whole, which cannot be shared, so both compile
+what all kernels asked for call before either translates one. The helper starts only when a step's kernels
+are not on disk. It ends with this process, or when it has had nothing to do for a while.
 """
 
 from __future__ import annotations
@@ -13,11 +14,14 @@ import importlib
 import multiprocessing
 import os
 import pickle
+import queue
 import signal
 import subprocess
 import sys
-from collections.abc import Iterable
+import threading
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +32,23 @@ _IDLE_S = 30
 _CODE = "from entropy_explore_env.compilation.second_process import serve; serve()"
 
 
+_Request = tuple[Any, tuple[Any, ...]]
+"""A kernel, and the types of Numba that it is called with."""
+
+
 class _Helper:
-    """The helper of this process, as far as there is one."""
+    """The helper of this process, as far as there is one, or this process as a helper."""
 
     process: subprocess.Popen[bytes] | None = None
-    serving = False
+    requests: Connection | None = None
+    """Where a helper reads what it is asked for; None = this process is none."""
+
+    def __init__(self) -> None:
+        """Start nothing yet."""
+        self.asked: list[_Request] = []
+        self.begun = 0
+        """Number of requests for which what they call has been compiled, or is being compiled."""
+        self.unsent: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
     def runs(self) -> bool:
         """Whether a helper is at work."""
@@ -44,36 +60,41 @@ _helper = _Helper()
 
 def serves() -> bool:
     """Whether this process is a helper."""
-    return _helper.serving
+    return _helper.requests is not None
 
 
 def shared() -> bool:
     """Whether another process compiles the same kernels as this one."""
-    return _helper.serving or _helper.runs()
+    return serves() or _helper.runs()
 
 
-def send(kernels: Iterable[tuple[Any, tuple[Any, ...]]], *, start: bool = False) -> None:
-    """Let the helper compile kernels, each for the types of its arguments.
+def send(kernels: Iterable[_Request], *, start: bool = False) -> None:
+    """Let the helper compile kernels.
 
     Args:
-        kernels: (kernel, types of Numba) each.
+        kernels: Each with the types of its arguments.
         start: Whether to start a helper if there is none.
     """
     if start and not _helper.runs() and _is_wanted():
         _start()
-    process = _helper.process
-    if process is None or process.stdin is None or not _helper.runs():
+    if not _helper.runs():
         return
-    with suppress(OSError, ValueError):  # it has ended
-        for kernel, types in kernels:
-            function = kernel.py_func
-            process.stdin.write(dumps((function.__module__, function.__qualname__, types)))
-        process.stdin.flush()
+    for kernel, types in kernels:
+        if (kernel, types) not in _helper.asked:
+            _helper.asked.append((kernel, types))
+            _helper.unsent.put(dumps((kernel.py_func.__module__, kernel.py_func.__qualname__, types)))
+
+
+def not_begun() -> Iterator[_Request]:
+    """Yield kernels asked for, also while more are asked for; each process begins each of them once."""
+    while _helper.begun < len(_helper.asked) or _receive(wait_s=0):
+        _helper.begun += 1
+        yield _helper.asked[_helper.begun - 1]
 
 
 def _is_wanted() -> bool:
     """Whether a second process has a processor to run on, and can tell this one what it compiled."""
-    main = multiprocessing.parent_process() is None and not _helper.serving
+    main = multiprocessing.parent_process() is None and not serves()
     return main and fcntl is not None and kernel_folder() is not None and _processors() > 1
 
 
@@ -94,18 +115,35 @@ def _start() -> None:
             stderr=subprocess.DEVNULL,
         )
         atexit.register(_helper.process.kill)
+        threading.Thread(target=_write_requests, args=(_helper.process,), daemon=True).start()
+
+
+def _write_requests(process: subprocess.Popen[bytes]) -> None:
+    """Write what a helper is asked for: a pipe holds few requests, and the helper reads between kernels."""
+    assert process.stdin is not None
+    with suppress(OSError), Connection(os.dup(process.stdin.fileno()), readable=False) as requests:
+        while True:  # until it has ended
+            requests.send_bytes(_helper.unsent.get())
+
+
+def _receive(wait_s: float) -> bool:
+    """Return whether a helper was asked for one more kernel."""
+    try:
+        if _helper.requests is None or not _helper.requests.poll(wait_s):
+            return False
+        module, name, types = pickle.loads(_helper.requests.recv_bytes())
+        _helper.asked.append((getattr(importlib.import_module(module), name), types))
+    except (EOFError, OSError):  # the other process has ended
+        return False
+    return True
 
 
 def serve() -> None:
     """Compile what standard input asks for, until it ends."""
-    _helper.serving = True
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    while True:
-        signal.alarm(_IDLE_S)  # which ends the process
-        try:
-            module, name, types = pickle.load(sys.stdin.buffer)
-        except Exception:  # the other process has ended
-            return
-        signal.alarm(0)
+    _helper.requests, done = Connection(sys.stdin.fileno(), writable=False), 0
+    while done < len(_helper.asked) or _receive(wait_s=_IDLE_S):
+        kernel, types = _helper.asked[done]
+        done += 1
         with suppress(Exception):  # the process that asked for it meets the same and says so
-            getattr(importlib.import_module(module), name).compile(types)
+            kernel.compile(types)

@@ -121,6 +121,34 @@ def test_inlined_kernels_are_not_kept_others_are(folder):
     assert names == ["called", "calling"]
 
 
+def test_constants_short_integers_and_fields_of_records_are_compiled_once():
+    @lean_kernel
+    def plus(array, number, count):
+        return array[0] + number + count
+
+    @kernel
+    def calling(records, array, number):
+        field = records[0].field
+        return plus(array, number, 1) + plus(field, np.int16(2), number) + plus(field, number, 3)
+
+    records = np.array([([4.0, 5.0],)], [("field", float, (2,))])
+    assert calling(records, np.array([8.0]), 16) == (8 + 16 + 1) + (4 + 2 + 16) + (4 + 16 + 3)
+    assert list(plus.inner.overloads) == [(numba.float64[::1], numba.int64, numba.int64)]
+
+
+def test_unsigned_numbers_and_truth_values_stay_what_they_are():
+    @lean_kernel
+    def doubled(number):
+        return number + number
+
+    @kernel
+    def calling(byte, truth):
+        return doubled(byte), doubled(truth)
+
+    assert calling(np.uint8(200), True) == (400, 2)
+    assert len(doubled.inner.overloads) == 2
+
+
 def test_a_kernel_goes_to_another_process_and_back():
     assert pickle.loads(pickle.dumps(root)) is root
 

@@ -7,6 +7,7 @@ import threading
 import time
 from pathlib import Path
 
+import pytest
 from numba.core import config
 
 from entropy_explore_env.compilation import folder
@@ -83,6 +84,17 @@ def test_the_second_waits_for_the_first(tmp_path):
     thread.join(timeout=30)
     assert len(taken) == 1
     release(taken[0])
+    assert not list(tmp_path.iterdir())
+
+
+@needs_posix
+def test_who_does_not_wait_is_told_that_another_has_it(tmp_path):
+    kernel = tmp_path / "a.kernel"
+    first = claim(kernel, waits=False)
+    with pytest.raises(folder.ClaimedError):
+        claim(kernel, waits=False)
+    release(first)
+    release(claim(kernel, waits=False))
     assert not list(tmp_path.iterdir())
 
 

@@ -2,11 +2,13 @@
 
 import inspect
 from types import SimpleNamespace
+from typing import Any
 
 import llvmlite.binding as llvm
 import pytest
 from numba.core import dispatcher
 from numba.core.cpu import CPUContext
+from numba.core.registry import cpu_target
 
 from entropy_explore_env.compilation.numba_parts import (
     CODE_SETTINGS,
@@ -20,7 +22,11 @@ from entropy_explore_env.compilation.numba_parts import (
     compiler,
     config,
     type_inference_stage,
+    types,
 )
+
+CONTEXT: Any = cpu_target.target_context
+CPU_CODE = CONTEXT.codegen()
 
 
 @pytest.mark.parametrize(
@@ -37,7 +43,9 @@ from entropy_explore_env.compilation.numba_parts import (
         (compiler.Flags, ("copy", "nrt", "forceinline", "no_compile", "summary")),
         (vars(dispatcher)["_FunctionCompiler"], ("compile", "fold_argument_types", "_customize_flags")),
         (NativeLowering, ("run_pass",)),
-        (llvm, ("parse_bitcode", "parse_assembly")),
+        (types, ("unliteral", "signed_domain", "NestedArray", "Array")),
+        (CPU_CODE, ("_tm", "_data_layout")),
+        (llvm, ("parse_bitcode", "parse_assembly", "create_pass_builder", "create_pipeline_tuning_options")),
     ],
 )
 def test_what_is_overridden_or_called_exists(owner, names):

@@ -9,7 +9,7 @@ from entropy_explore_env.compilation import second_process
 from tests.compilation.test_kernels import run, start
 from tests.systems import needs_posix
 
-LEAVES = 12
+LEAVES = 24
 CODE = "from entropy_explore_env.compilation.kernels import lean_kernel\n"
 for number in range(LEAVES):
     CODE += f"\n\n@lean_kernel\ndef leaf{number}(x):\n    return x + {number}\n"
@@ -31,14 +31,52 @@ while not list(Path("cache").rglob("mine.caller-*.kernel")) and time.monotonic()
 print(second_process.shared(), caller(1.0), len(compiled_kernels()), flush=True)
 """
 WAIT = "print(second_process._helper.process.pid, flush=True)\ninput()\n"
-REVERSED = "from entropy_explore_env.compilation import second_process\nsecond_process._helper.serving = {}\n"
-REVERSED += "from mine import caller\nprint(caller(1.0))"
+SHARING = "from entropy_explore_env.compilation import dispatchers, second_process\n"
+SHARING += "second_process.serves, second_process.shared = lambda: {serves}, lambda: True\n"
+SHARING += "from mine import caller\n"
+BUSY = """
+claim = dispatchers.claim
+
+def busy(path, *, waits):
+    if not waits and path.name.startswith("mine.leaf3-"):
+        raise dispatchers.ClaimedError
+    return claim(path, waits=waits)
+
+dispatchers.claim = busy
+"""
+OTHERS = CODE.replace("leaf", "other").replace("caller", "later")
+ASKED = """
+from numba import float64
+from others import later
+
+asked = second_process._helper.asked
+asked += [(caller, (float64,)), (later, (float64,))]
+"""
+STOPPED = """
+import os
+import signal
+import numpy as np
+from numba import typeof
+
+fields = [(f"field_{number}", float) for number in range(500)]
+kinds = [(typeof(np.zeros(1, fields[:many])),) for many in range(1, 500)]
+os.kill(second_process._helper.process.pid, signal.SIGSTOP)
+second_process.send((caller, kind) for kind in kinds)
+print(len(second_process._helper.asked) - 1, flush=True)
+os.kill(second_process._helper.process.pid, signal.SIGKILL)
+"""
 
 
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "mine.py").write_text(CODE)
     return tmp_path
+
+
+def leaves_in_order(folder):
+    """The numbers of the leaves on disk, in the order in which they were written."""
+    written = {file.stat().st_mtime_ns: file.name for file in folder.rglob("mine.leaf*.kernel")}
+    return [int(written[when].partition("-")[0].removeprefix("mine.leaf")) for when in sorted(written)]
 
 
 @needs_posix
@@ -73,10 +111,32 @@ def test_one_processor_has_no_helper(folder):
 
 @pytest.mark.parametrize("serving", [False, True])
 def test_the_helper_begins_with_the_last_call(folder, serving):
-    run(REVERSED.format(serving), folder)
-    written = {file.stat().st_mtime_ns: file.name for file in folder.rglob("mine.leaf*.kernel")}
-    order = [int(written[when].partition("-")[0].removeprefix("mine.leaf")) for when in sorted(written)]
-    assert order == sorted(range(LEAVES), reverse=serving)
+    run(SHARING.format(serves=serving) + "caller(1.0)", folder)
+    assert leaves_in_order(folder) == sorted(range(LEAVES), reverse=serving)
+
+
+@needs_posix
+def test_what_another_process_compiles_is_left_for_later(folder):
+    said = run(SHARING.format(serves=False) + BUSY + "print(caller(1.0))", folder)
+    assert said == f"{LEAVES + sum(range(LEAVES)):.1f}"
+    assert leaves_in_order(folder) == [*(number for number in range(LEAVES) if number != 3), 3]
+
+
+def test_what_all_kernels_asked_for_call_comes_before_one_is_translated(folder):
+    (folder / "others.py").write_text(OTHERS)
+    said = run(SHARING.format(serves=False) + ASKED + "print(caller(1.0))", folder)
+    assert said == f"{LEAVES + sum(range(LEAVES)):.1f}"
+    assert len(list(folder.rglob("others.other*.kernel"))) == LEAVES
+    assert not list(folder.rglob("others.later*.kernel"))
+    caller = next(iter(folder.rglob("mine.caller*.kernel")))
+    others = [file.stat().st_mtime_ns for file in folder.rglob("others.other*.kernel")]
+    assert max(others) <= caller.stat().st_mtime_ns
+
+
+@needs_posix
+def test_a_process_does_not_wait_until_its_helper_reads(folder):
+    said = run(ASK.format(processors=2, patience_s=100.0) + STOPPED, folder)
+    assert said.splitlines()[-1] == "499"
 
 
 def test_processes_of_a_pool_start_none(monkeypatch):
