@@ -48,7 +48,7 @@ def compiling(name: str, folder: Path | None) -> Iterator[None]:
     if not _progress.announced:
         _progress.announced = _progress.pending = True
         kept = "" if folder is None else f"; they are kept in {short_path(folder)}"
-        _say(f"entropy_explore_env: compiling kernels, a minute or two{kept}")
+        _say(f"entropy_explore_env: compiling kernels, up to a minute{kept}")
     began_s = time.perf_counter()
     try:
         yield

@@ -58,6 +58,8 @@ class _Compiling:
         self.path = form.disk.path_of(self.name)
         self.claim: IO[bytes] | None = None
         self.callees_only = False
+        self.inferred: tuple[Any, Any] | None = None
+        """The kernel in Numba's form and its types, once a survey has found that all it calls is ready."""
         self.waits, _state.waits = _state.waits, True
         """Whether to wait while another process compiles it."""
 
@@ -105,7 +107,7 @@ def _compiling(form: _Form, sig: Any) -> Iterator[_Compiling]:  # noqa: ANN401 -
     if collecting:
         gc.disable()
     try:
-        with shortcuts(form.targetctx) if outermost else nullcontext():
+        with shortcuts(form.targetctx, _infer_once) if outermost else nullcontext():
             yield compiling
     finally:
         _state.kernels.pop()
@@ -223,22 +225,27 @@ def _compile_callees(state: Any, *, waits: bool) -> bool:  # noqa: ANN401 - as a
 
 def _survey(state: Any) -> list[tuple[InnerKernel, tuple[types.Type, ...]]]:  # noqa: ANN401 - as above
     """Return calls of other kernels, neither compiled nor on disk, whose types follow from what is known."""
-    _state.found = {}
+    _state.found, asked = {}, (state.args, state.return_type, state.locals)
     try:
-        type_inference_stage(
-            state.typingctx,
-            state.targetctx,
-            state.func_ir,
-            state.args,
-            state.return_type,
-            state.locals,
-            raise_errors=False,
+        inferred = type_inference_stage(
+            state.typingctx, state.targetctx, state.func_ir, *asked, raise_errors=False
         )
+        unknown = inferred.return_type is None or types.unknown in inferred.typemap.values()
+        if not (_state.found or unknown or inferred.typing_errors):
+            _state.kernels[-1].inferred = state.func_ir, inferred
     except errors.NumbaError:
         pass
     finally:
         found, _state.found = _state.found, None
     return list(found)
+
+
+def _infer_once(typing_context: Any, target_context: Any, function: Any, *asked: Any, **options: Any) -> Any:  # noqa: ANN401
+    """Infer types as Numba does, unless the latest survey has."""
+    inferred = _state.kernels[-1].inferred
+    if inferred is not None and inferred[0] is function:
+        return inferred[1]
+    return type_inference_stage(typing_context, target_context, function, *asked, **options)
 
 
 class _Form(CPUDispatcher):

@@ -10,6 +10,7 @@ from numba.core import compiler as compiler
 from numba.core import config as config
 from numba.core import errors as errors
 from numba.core import sigutils as sigutils
+from numba.core import typed_passes as typed_passes
 from numba.core import types as types
 from numba.core.codegen import JITCodeLibrary as JITCodeLibrary
 from numba.core.compiler_lock import global_compiler_lock as global_compiler_lock

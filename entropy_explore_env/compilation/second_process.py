@@ -29,7 +29,17 @@ from entropy_explore_env.compilation.folder import fcntl, kernel_folder
 from entropy_explore_env.compilation.numba_parts import config, dumps
 
 _IDLE_S = 30
-_CODE = "from entropy_explore_env.compilation.second_process import serve; serve()"
+_CODE = """
+import sys
+from types import ModuleType
+
+package = sys.modules["{name}"] = ModuleType("{name}")
+package.__path__ = {path}
+from {name}.compilation.second_process import serve
+
+serve()
+"""
+"""What a helper runs: kernels need their own modules, not the environments that the package imports."""
 
 
 _Request = tuple[Any, tuple[Any, ...]]
@@ -106,9 +116,10 @@ def _start() -> None:
     """Start a helper that finds modules where this process does, and keeps kernels there."""
     modules = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)
     folder = str(getattr(config, "CACHE_DIR", ""))
+    package = sys.modules[__name__.partition(".")[0]]
     with suppress(OSError):
         _helper.process = subprocess.Popen(
-            [sys.executable, "-c", _CODE],
+            [sys.executable, "-c", _CODE.format(name=package.__name__, path=list(package.__path__))],
             env={**os.environ, "PYTHONPATH": modules, "NUMBA_CACHE_DIR": folder},
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,

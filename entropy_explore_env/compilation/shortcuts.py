@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from entropy_explore_env.compilation.numba_parts import BaseFunction, ConfigStack, default_mangler
+from entropy_explore_env.compilation.numba_parts import (
+    BaseFunction,
+    ConfigStack,
+    default_mangler,
+    type_inference_stage,
+    typed_passes,
+)
 
 _known: dict[tuple[Any, ...], Any] = {}
 """Signatures of Numba's own functions, by function, types of arguments and options."""
@@ -36,12 +42,18 @@ def _short_name(name: str, types: Any, *, abi_tags: Any = (), uid: Any = None) -
 
 
 @contextmanager
-def shortcuts(target_context: Any) -> Iterator[None]:  # noqa: ANN401 - of Numba
-    """Let Numba take the shortcuts; its lock of compiling is held meanwhile."""
+def shortcuts(target_context: Any, infer: Callable[..., Any]) -> Iterator[None]:  # noqa: ANN401 - of Numba
+    """Let Numba take the shortcuts; its lock of compiling is held meanwhile.
+
+    Args:
+        target_context: Of the kernels that are compiled.
+        infer: In place of `type_inference_stage`.
+    """
     functions: Any = BaseFunction
     functions.get_call_type, target_context.mangler = _resolve_once, _short_name
+    typed_passes.type_inference_stage = infer
     try:
         yield
     finally:
-        functions.get_call_type = _resolve
+        functions.get_call_type, typed_passes.type_inference_stage = _resolve, type_inference_stage
         del target_context.mangler

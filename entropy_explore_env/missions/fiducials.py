@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,7 +16,9 @@ from entropy_explore_env.robots.localization import correct_estimate, sighting_e
 from entropy_explore_env.robots.pose_covariance import in_field_of_view
 from entropy_explore_env.robots.range_sensor import body_distance
 from entropy_explore_env.settings.scenario import Scenario
-from entropy_explore_env.worlds.world import World
+
+if TYPE_CHECKING:
+    from entropy_explore_env.worlds.world import World
 
 _ON_FACE = 0.49
 """How far from a voxel's middle a drawn fiducial is, in edges: on the surface beside it, and still free."""

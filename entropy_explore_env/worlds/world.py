@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
-from scipy.spatial import ConvexHull
 
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.settings.grid import Grid
@@ -254,6 +253,8 @@ class World:
         Returns:
             (X, Y, Z) bool.
         """
+        from scipy.spatial import ConvexHull  # takes a tenth of the time to import the package
+
         edge_m = self.grid.voxel_size_m
         indices = np.argwhere(positions)
         corners = indices[ConvexHull(indices).vertices] if _spans_plane(indices) else indices

@@ -29,7 +29,7 @@ def test_one_line_before_and_one_after(caplog):
     compile_two()
     announcement.end_of_step()
     assert [record.getMessage() for record in caplog.records] == [
-        "entropy_explore_env: compiling kernels, a minute or two; they are kept in ~/.cache/kernels",
+        "entropy_explore_env: compiling kernels, up to a minute; they are kept in ~/.cache/kernels",
         "entropy_explore_env: compiled 2 kernels in 0 s",
     ]
     assert {(record.name, record.levelno) for record in caplog.records} == {

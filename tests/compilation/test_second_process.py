@@ -44,6 +44,15 @@ def busy(path, *, waits):
 
 dispatchers.claim = busy
 """
+COUNTED = """
+infer, inferred = dispatchers.type_inference_stage, []
+
+def counting(typing_context, target_context, function, *asked, **options):
+    inferred.append(function.func_id.func_name)
+    return infer(typing_context, target_context, function, *asked, **options)
+
+dispatchers.type_inference_stage = counting
+"""
 OTHERS = CODE.replace("leaf", "other").replace("caller", "later")
 ASKED = """
 from numba import float64
@@ -131,6 +140,13 @@ def test_what_all_kernels_asked_for_call_comes_before_one_is_translated(folder):
     caller = next(iter(folder.rglob("mine.caller*.kernel")))
     others = [file.stat().st_mtime_ns for file in folder.rglob("others.other*.kernel")]
     assert max(others) <= caller.stat().st_mtime_ns
+
+
+def test_types_that_a_survey_has_inferred_are_not_inferred_again(folder):
+    said = run(
+        SHARING.format(serves=False) + COUNTED + "caller(1.0)\nprint(inferred.count('caller'))", folder
+    )
+    assert said == "2"  # which leaves it calls, and, now that they are compiled, its own types
 
 
 @needs_posix

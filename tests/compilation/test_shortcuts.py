@@ -7,7 +7,7 @@ import pytest
 from numba.core import errors, types
 from numba.core.registry import cpu_target
 
-from entropy_explore_env.compilation.numba_parts import BaseFunction
+from entropy_explore_env.compilation.numba_parts import BaseFunction, type_inference_stage
 from entropy_explore_env.compilation.shortcuts import shortcuts
 
 CPU: Any = cpu_target
@@ -29,7 +29,7 @@ def test_functions_have_the_same_signature(function, args):
     TARGET.refresh()
     kind = CONTEXT.resolve_value_type(function)
     expected = kind.get_call_type(CONTEXT, args, {})
-    with shortcuts(TARGET):
+    with shortcuts(TARGET, type_inference_stage):
         for _ in range(2):
             found = kind.get_call_type(CONTEXT, args, {})
             assert (found.args, found.return_type) == (expected.args, expected.return_type)
@@ -38,7 +38,7 @@ def test_functions_have_the_same_signature(function, args):
 
 def test_what_has_no_signature_is_refused_each_time():
     kind = CONTEXT.resolve_value_type(operator.add)
-    with shortcuts(TARGET):
+    with shortcuts(TARGET, type_inference_stage):
         for _ in range(2):
             with pytest.raises(errors.TypingError, match="No implementation"):
                 kind.get_call_type(CONTEXT, (types.float64, types.none), {})
@@ -47,7 +47,7 @@ def test_what_has_no_signature_is_refused_each_time():
 def test_symbols_leave_out_types_where_the_stamp_holds_them():
     args = types.UniTuple(types.int64, 3), types.Array(types.float64, 2, "C")
     long = TARGET.mangler("module.f", args, uid="1a2b")
-    with shortcuts(TARGET):
+    with shortcuts(TARGET, type_inference_stage):
         assert "Array" in TARGET.mangler("module.f", args, uid=7)
         assert "Array" not in TARGET.mangler("module.f", args, uid="1a2b")
         assert TARGET.mangler("module.f", args, uid="1a2b") != TARGET.mangler("module.f", args, uid="1a2c")
@@ -56,7 +56,7 @@ def test_symbols_leave_out_types_where_the_stamp_holds_them():
 
 def test_afterwards_numba_is_as_it_was():
     before = BaseFunction.get_call_type
-    with pytest.raises(ZeroDivisionError), shortcuts(TARGET):
+    with pytest.raises(ZeroDivisionError), shortcuts(TARGET, type_inference_stage):
         assert BaseFunction.get_call_type is not before
         raise ZeroDivisionError
     assert BaseFunction.get_call_type is before
