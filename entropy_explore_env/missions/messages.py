@@ -86,6 +86,32 @@ class Tracer(NamedTuple):
     """(V,) float32, any map of the workspace; what it holds does not matter."""
 
 
+class InFlight(NamedTuple):
+    """The delayed messages of one mission: slices of MissionState."""
+
+    messages: np.ndarray
+    """(Q,) MESSAGE."""
+    recipients: np.ndarray
+    """(Q, A) bool."""
+    rays: np.ndarray
+    """(Q, B, 5) float64."""
+    covariances: np.ndarray
+    """(Q, 10) float64."""
+
+
+@lean_kernel
+def in_flight_of(slots, state, mission):
+    """Return the InFlight of a mission; None where all messages arrive at once."""
+    if slots is None:  # known while compiling: nothing of the rest is compiled
+        return None
+    return InFlight(
+        state.in_flight[mission],
+        state.in_flight_to[mission],
+        state.in_flight_rays[mission],
+        state.in_flight_covariances[mission],
+    )
+
+
 class Maps(NamedTuple):
     """The beliefs of one mission's robots, and the cells that they are pooled to."""
 
@@ -228,7 +254,7 @@ def passes(air, team, mate, place, time_s):
 
 
 @lean_kernel
-def enqueue(clock, team, in_flight, index, count, recipients, delay_s):
+def enqueue(in_flight, clock, team, index, count, recipients, delay_s):
     """Put a message into a free slot; returns the slot, or -1 where there is none: the message is gone.
 
     There is one in every mission: `Scenario.message_slots` counts how many messages can be under way at once.
@@ -239,6 +265,8 @@ def enqueue(clock, team, in_flight, index, count, recipients, delay_s):
         recipients: (A,) bool, which robots will hear it.
         delay_s: How long it is under way.
     """
+    if in_flight is None:  # known while compiling: nothing of the rest is compiled
+        return -1
     slot = 0
     while slot < len(in_flight.messages) and not math.isinf(in_flight.messages[slot].due_s):
         slot += 1
@@ -303,15 +331,22 @@ def send_batch(team, maps, clock, in_flight, scan, index, count, recipients):
     count_sent(robot, count, bits)
     reached = transmit(team, index, point(robot.scan_pose), time_s, ONE_MESSAGE, recipients)
     if reached and delay_s > 0.0:
-        slot = enqueue(clock, team, in_flight, index, count, recipients, delay_s)
-        if slot >= 0:
-            pack_measurements(scan, count, in_flight.rays[slot])
+        keep_batch(in_flight, enqueue(in_flight, clock, team, index, count, recipients, delay_s), scan, count)
         return
     here = believed_scan_pose(team.localization, robot, index)
     for mate in range(len(team.robots)):
         if recipients[mate] and takes_in(team.faults, team.robots[mate], mate, time_s, bits):
             note_message(team.robots[mate], team.heard[mate, index], here, time_s, count, bits)
             hear_batch(team, maps, scan, mate, count)
+
+
+@lean_kernel
+def keep_batch(in_flight, slot, scan, count):
+    """Put `count` measurements of `scan.order` into a message that is under way, if it has a slot."""
+    if in_flight is None:  # known while compiling: nothing of the rest is compiled
+        return
+    if slot >= 0:
+        pack_measurements(scan, count, in_flight.rays[slot])
 
 
 @lean_kernel
@@ -326,7 +361,7 @@ def announce(team, clock, in_flight, index, recipients):
     delay_s = shared.delay_s + draw_lateness(team.faults, index)
     reached = transmit(team, index, point(robot.origin), time_s, ONE_MESSAGE, recipients)
     if reached and delay_s > 0.0:
-        enqueue(clock, team, in_flight, index, _ANNOUNCEMENT, recipients, delay_s)
+        enqueue(in_flight, clock, team, index, _ANNOUNCEMENT, recipients, delay_s)
         return
     here = believed_pose(estimate_of(team.localization, index), team.params[index], robot.origin)
     for mate in range(len(team.robots)):
@@ -345,8 +380,10 @@ def count_sent(robot, count, bits):
 
 
 @lean_kernel
-def receive(team, maps, in_flight, slot, tracer, scan):
+def receive(in_flight, team, maps, slot, tracer, scan):
     """Deliver a delayed message: recipients fuse it, or note what it announces; its slot is free again."""
+    if in_flight is None:  # known while compiling: nothing of the rest is compiled
+        return
     message = in_flight.messages[slot]
     time_s, bits = message.due_s, message_bits(team.localization, message.count)
     message.due_s = math.inf
@@ -364,9 +401,12 @@ def receive(team, maps, in_flight, slot, tracer, scan):
 
 
 @lean_kernel
-def next_message(messages):
+def next_message(in_flight):
     """Return (slot, time) of the next message that arrives, the earlier sent first; time inf if none."""
     soonest, due_s = 0, math.inf
+    if in_flight is None:  # known while compiling: nothing of the rest is compiled
+        return soonest, due_s
+    messages = in_flight.messages
     for slot in range(len(messages)):
         due = messages[slot].due_s
         if due < due_s or (

@@ -106,6 +106,8 @@ class Rules(NamedTuple):
     """(A,) FAULT_PARAMS; None = nothing goes wrong."""
     localization: np.ndarray | None
     """(A,) LOCALIZATION_PARAMS; None = all robots know where they are."""
+    slots: int | None
+    """Most messages that are under way at once; None = all arrive at once."""
     repeats: int | None
     """How often a batch is broadcast in a phase; None = batches are sent at once."""
 
@@ -179,6 +181,7 @@ def rules_of(scenario: Scenario) -> Rules:
         panorama=panorama_directions(scenario),
         faults=fault_params(scenario),
         localization=localization_params(scenario),
+        slots=scenario.message_slots or None,
         repeats=channel.repeats if channel.phase_s > 0.0 else None,
     )
 

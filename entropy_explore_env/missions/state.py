@@ -167,19 +167,6 @@ class LatestScans(NamedTuple):
     """(A, R) float64."""
 
 
-class InFlight(NamedTuple):
-    """The delayed messages of one mission: slices of MissionState."""
-
-    messages: np.ndarray
-    """(Q,) MESSAGE."""
-    recipients: np.ndarray
-    """(Q, A) bool."""
-    rays: np.ndarray
-    """(Q, B, 5) float64."""
-    covariances: np.ndarray
-    """(Q, 10) float64."""
-
-
 class StateArray(NamedTuple):
     """What an array of the state is like."""
 

@@ -76,7 +76,7 @@ def send_summary(summaries, team, maps, clock, in_flight, index, length, recipie
     if not transmit(team, index, point(robot.scan_pose), time_s, ONE_MESSAGE, recipients):
         return
     if delay_s > 0.0:
-        slot = enqueue(clock, team, in_flight, index, _NO_MEASUREMENTS, recipients, delay_s)
+        slot = enqueue(in_flight, clock, team, index, _NO_MEASUREMENTS, recipients, delay_s)
         if slot >= 0:
             pack_summary(summaries, slot, index, len(team.robots), length)
         return
@@ -112,7 +112,7 @@ def receive_summary(summaries, team, maps, in_flight, slot):
     Returns:
         Whether the message was one; if not, nothing has changed.
     """
-    if summaries is None:  # known while compiling: nothing of the rest is compiled
+    if summaries is None or in_flight is None:  # known while compiling: nothing of the rest is compiled
         return False
     message, parcel = in_flight.messages[slot], summaries.parcels[slot]
     length = parcel.bytes

@@ -32,7 +32,15 @@ from entropy_explore_env.missions.events import (
 )
 from entropy_explore_env.missions.faults import faults_of, note_stop
 from entropy_explore_env.missions.localization import estimate_of, localization_of, note_motion
-from entropy_explore_env.missions.messages import Maps, Team, Tracer, announce, receive
+from entropy_explore_env.missions.messages import (
+    InFlight,
+    Maps,
+    Team,
+    Tracer,
+    announce,
+    in_flight_of,
+    receive,
+)
 from entropy_explore_env.missions.own_maps import summaries_of
 from entropy_explore_env.missions.phases import TeamPhases, broadcast_all, phases_of
 from entropy_explore_env.missions.records import MissionEnd
@@ -40,7 +48,7 @@ from entropy_explore_env.missions.redecision import decide, note_braking
 from entropy_explore_env.missions.reward import reward_robots
 from entropy_explore_env.missions.scanning import scan_and_share
 from entropy_explore_env.missions.scoring import note_progress
-from entropy_explore_env.missions.state import Beliefs, InFlight, JointMap, LatestScans
+from entropy_explore_env.missions.state import Beliefs, JointMap, LatestScans
 from entropy_explore_env.missions.summaries import receive_summary
 from entropy_explore_env.robots.channel import Air
 from entropy_explore_env.robots.range_sensor import sensor_of
@@ -58,9 +66,10 @@ class Mission(NamedTuple):
     maps: Maps
     joint: JointMap
     latest: LatestScans
-    in_flight: InFlight
+    in_flight: InFlight | None
+    """None = all messages arrive at once, like the next one known while compiling."""
     phases: TeamPhases | None
-    """None = batches are sent at once: nothing else is compiled."""
+    """None = batches are sent at once."""
     truth: np.ndarray
     """(V,) float32."""
 
@@ -85,12 +94,7 @@ def step_missions(rules, state, choices, work, continuous, discrete, first, last
             Maps(Beliefs(state.mean[m], state.precision[m], state.pooled[m]), rules.cells),
             JointMap(state.joint_mean[m], state.joint_precision[m], state.visible[m], state.drivable[m]),
             LatestScans(state.scan_range_m[m], state.scan_returned[m], state.scan_utility_bits[m]),
-            InFlight(
-                state.in_flight[m],
-                state.in_flight_to[m],
-                state.in_flight_rays[m],
-                state.in_flight_covariances[m],
-            ),
+            in_flight_of(rules.slots, state, m),
             phases_of(rules.repeats, state, m),
             state.truth[m],
         )
@@ -158,21 +162,21 @@ def advance(mission, sensors, work):
     """Process the events up to the end of the step, the time limit or the mission's end."""
     clock, team, maps, scan = mission.clock, mission.team, mission.maps, work.scan
     params, robots, tracer = team.params, team.robots, Tracer(sensors.params, mission.truth)
-    shared, messages = params[0], mission.in_flight.messages
+    shared, in_flight = params[0], mission.in_flight
     target_s = clock.time_s + shared.period_s
     if math.isinf(target_s):
         target_s = next_decision(params, robots)
     stop_s = min(target_s, shared.time_limit_s)
     while clock.end == _RUNNING:
-        event = next_event(shared, robots, messages, mission.phases, team.faults)
+        event = next_event(shared, robots, in_flight, mission.phases, team.faults)
         if event.kind == NO_EVENT or event.time_s > stop_s:
             break
-        handled = events_handled(robots, messages, mission.phases, team.faults) if ASSERTING else 0
+        handled = events_handled(robots, in_flight, mission.phases, team.faults) if ASSERTING else 0
         earlier_s = clock.time_s
         clock.time_s = max(clock.time_s, event.time_s)
         if event.kind == MESSAGE_ARRIVES:
-            if not receive_summary(team.summaries, team, maps, mission.in_flight, event.number):
-                receive(team, maps, mission.in_flight, event.number, tracer, scan)
+            if not receive_summary(team.summaries, team, maps, in_flight, event.number):
+                receive(in_flight, team, maps, event.number, tracer, scan)
         elif event.kind == BROADCAST_DUE:
             broadcast_all(mission.phases, team, maps, clock.time_s, tracer, scan, work.recipients)
         elif event.kind == ROBOT_STOPS:
@@ -196,7 +200,7 @@ def advance(mission, sensors, work):
                 stop_s = min(next_decision(params, robots), shared.time_limit_s)
         if ASSERTING and clock.time_s < earlier_s:
             raise AssertionError("time ran backwards")
-        if ASSERTING and events_handled(robots, messages, mission.phases, team.faults) <= handled:
+        if ASSERTING and events_handled(robots, in_flight, mission.phases, team.faults) <= handled:
             raise AssertionError("an event was not used up")
         note_progress(clock, robots)
         clock.end = mission_end(mission)

@@ -10,7 +10,8 @@ import pytest
 
 from entropy_explore_env.missions.events import events_handled, next_event
 from entropy_explore_env.missions.faults import TeamFaults
-from entropy_explore_env.missions.phases import phases_of
+from entropy_explore_env.missions.messages import InFlight
+from entropy_explore_env.missions.phases import TeamPhases
 from entropy_explore_env.missions.records import FAULT, MESSAGE, ROBOT
 from entropy_explore_env.missions.rules import PARAMS
 from entropy_explore_env.robots.faults import FAULT_PARAMS
@@ -23,7 +24,14 @@ NEVER = math.inf
 def in_phases(repeats):
     """The phases of a mission in which so far nothing was collected."""
     state = started(free_box(robots=3, channel={"phase_s": 6.0, "repeats": repeats})).state
-    return phases_of(repeats, state, 0)
+    batches = state.phase_counts, state.phase_batches, state.phase_rays, state.phase_heard
+    return TeamPhases(repeats, state.phases, *(array[0] for array in (*batches, state.phase_covariances)))
+
+
+def in_flight_in(state):
+    """The delayed messages of the one mission in a state."""
+    messages = state.in_flight, state.in_flight_to, state.in_flight_rays, state.in_flight_covariances
+    return InFlight(*(array[0] for array in messages))
 
 
 def event(due_s=(), serials=None, broadcasts=None, scans_s=(), deciding=(), stops_s=None, stopped=()):
@@ -43,7 +51,8 @@ def event(due_s=(), serials=None, broadcasts=None, scans_s=(), deciding=(), stop
         faults.states["stop_s"] = NEVER
         faults.states["stop_s"][: len(stops_s)] = stops_s
         faults.states["stopped"][list(stopped)] = True
-    return tuple(next_event(shared[0], robots, messages, phases, faults))
+    in_flight = InFlight(messages, np.zeros((3, 4), bool), np.zeros((3, 1, 5)), np.zeros((3, 10)))
+    return tuple(next_event(shared[0], robots, in_flight, phases, faults))
 
 
 @pytest.mark.parametrize(
@@ -111,13 +120,12 @@ def test_a_broadcast_is_due_while_all_robots_decide_and_decisions_under_way_are_
 
 
 def test_every_kind_of_event_counts_as_handled():
-    missions = started(free_box(robots=3, channel={"delay_s": 1.0, "burst": 2}))
-    state = missions.state
+    state = started(free_box(robots=3, channel={"delay_s": 1.0, "burst": 2})).state
 
     def handled():
-        return events_handled(state.robots[0], state.in_flight[0], phases, faults)
+        return events_handled(state.robots[0], in_flight, phases, faults)
 
-    faults, phases = None, in_phases(2)
+    faults, phases, in_flight = None, in_phases(2), in_flight_in(state)
 
     begun = handled()
     assert begun == 6  # all decide, and will not under way
