@@ -252,7 +252,7 @@ def about(task: Task) -> str:
     if math.isfinite(sensor.scan_every_m):
         team += f" that scans {sensor.rays} rays of {sensor.max_range_m:g} m every {sensor.scan_every_m:g} m"
     return (
-        f"{task.missions} starts, {worlds}, {shape} voxels of {grid.voxel_size_m:g} m, {team}, "
+        f"{counted(task.missions, 'start')}, {worlds}, {shape} voxels of {grid.voxel_size_m:g} m, {team}, "
         f"time limit {scenario.ending.time_limit_s:,.0f} s."
     )
 
