@@ -42,8 +42,8 @@ _NO_WRAPPERS = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
 _WORTH_DIVIDING = 20
 """Trees of at least this many kernels are compiled by two processes: to divide the work costs time, too.
 
-Whatever calls a tree that is divided has to be divided, too: until the outermost inference ends, Numba keeps
-what a survey could not resolve.
+None is divided within an inference, such as that of a function that `njit` made: until the outermost one
+ends, Numba keeps what a survey could not resolve.
 """
 
 
@@ -60,7 +60,7 @@ class _Compiling:
         self.callees_only = False
         self.inferred: tuple[Any, Any] | None = None
         """The kernel in Numba's form and its types, once a survey has found that all it calls is ready."""
-        self.waits, _state.waits = _state.waits, True
+        self.waits = True
         """Whether to wait while another process compiles it."""
 
 
@@ -101,6 +101,7 @@ def _compiling(form: _Form, sig: Any) -> Iterator[_Compiling]:  # noqa: ANN401 -
             f"kernel {form.py_func.__qualname__} calls itself; Numba's own njit allows that"
         )
     compiling = _Compiling(form, sig)
+    compiling.waits, _state.waits = _state.waits, True  # said of this kernel alone
     _state.kernels.append(compiling)
     collecting = outermost and gc.isenabled()
     # A compiler makes many objects and few cycles: looking for them takes an eighth of its time.
@@ -117,7 +118,7 @@ def _compiling(form: _Form, sig: Any) -> Iterator[_Compiling]:  # noqa: ANN401 -
 
 
 def _calls_itself(form: _Form) -> bool:
-    """Return whether a kernel is being compiled for its own sake; others may wait while its turn comes."""
+    """Return whether a kernel is being compiled already, for the kernel that was asked for last."""
     for compiling in reversed(_state.kernels):
         if compiling.form.py_func is form.py_func:
             return True
@@ -179,9 +180,10 @@ class CalleesFirst(AnalysisPass):
         super().__init__()
 
     def run_pass(self, state: Any) -> bool:  # noqa: ANN401 - Numba's bag of everything
-        """Compile the kernels that are called, what another process compiles at the moment last."""
+        """Compile the kernels that are called, last those that another process is compiling."""
         compiling = _state.kernels[-1]
-        if second_process.shared() and compiling.tree_size >= _WORTH_DIVIDING:
+        within = len(state.typingctx.callstack) > 0
+        if second_process.shared() and compiling.tree_size >= _WORTH_DIVIDING and not within:
             left = _compile_callees(state, waits=False)
             if len(_state.kernels) == 1 and not compiling.callees_only:
                 for kernel, args in second_process.not_begun():
@@ -297,7 +299,7 @@ class _Form(CPUDispatcher):
 
 
 def _general(kind: types.Type) -> types.Type:
-    """Return the type for which a kernel is compiled that is called with another one.
+    """Return the type for which a kernel is compiled when it is called with this one.
 
     Constants, short integers and fields of records have types of their own. Each would be compiled apart,
     into code that does the same.
@@ -332,8 +334,8 @@ class InnerKernel(_Form):
 
     def get_call_template(self, args: Any, kws: Any) -> Any:  # noqa: ANN401 - types of arguments
         """As Numba's, for general types; a survey only notes what would have to be compiled."""
-        args = tuple(map(_general, args))
-        if _state.found is not None:
+        args, kws = tuple(map(_general, args)), {name: _general(kind) for name, kind in kws.items()}
+        if _state.found is not None and len(self.typingctx.callstack) == 1:
             folded = tuple(self._compiler.fold_argument_types(args, kws)[1])
             if not self.is_ready(folded):
                 _state.found[self, folded] = None
@@ -375,11 +377,11 @@ class Kernel(_Form):
 
     def compile_callees(self, args: tuple[types.Type, ...]) -> None:
         """Compile the kernels that this one calls for some types, as far as they are not on disk."""
-        with global_compiler_lock, suppress(errors.NumbaError), _compiling(self, args) as compiling:
+        failures = suppress(Exception)  # whoever compiles the kernel itself meets them
+        with global_compiler_lock, failures, _compiling(self, args) as compiling:
             compiling.callees_only, compiling.waits = True, False
             if cache.load(compiling.path, args) is None:
-                with suppress(_CalleesCompiledError, ClaimedError):
-                    self._compiler.compile(args, None)
+                self._compiler.compile(args, None)
 
     def _result(self, compiling: _Compiling, args: Any, return_type: Any) -> compiler.CompileResult:  # noqa: ANN401
         """As of every form; says so, and lets the helper take part."""

@@ -4,7 +4,7 @@ Both are given the same kernels. This one goes through the kernels that each of 
 the last, the helper from the last to the first; what one has compiled the other finds on disk, and they meet
 in the middle. A kernel that Python calls is translated as a whole, which cannot be shared, so both compile
 what all kernels asked for call before either translates one. The helper starts only when a step's kernels
-are not on disk. It ends with this process, or when it has had nothing to do for a while.
+are not on disk. It is ended with this process, and ends when it has had nothing to do for a while.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import signal
 import subprocess
 import sys
 import threading
+from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from multiprocessing.connection import Connection
@@ -51,14 +52,17 @@ class _Helper:
 
     process: subprocess.Popen[bytes] | None = None
     requests: Connection | None = None
-    """Where a helper reads what it is asked for; None = this process is none."""
+    """Where a helper reads what it is asked for; None = this process is not a helper."""
 
     def __init__(self) -> None:
         """Start nothing yet."""
+        self.lock = threading.Lock()
+        """Held while a helper is asked, so that threads start one helper alone."""
         self.asked: list[_Request] = []
-        self.begun = 0
-        """Number of requests for which what they call has been compiled, or is being compiled."""
-        self.unsent: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self.waiting: deque[_Request] = deque()
+        """Those of which this process has not begun to compile what they call."""
+        self.unsent: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        """What the helper has not been sent yet; None = there is no more."""
 
     def runs(self) -> bool:
         """Whether a helper is at work."""
@@ -85,21 +89,23 @@ def send(kernels: Iterable[_Request], *, start: bool = False) -> None:
         kernels: Each with the types of its arguments.
         start: Whether to start a helper if there is none.
     """
-    if start and not _helper.runs() and _is_wanted():
-        _start()
-    if not _helper.runs():
-        return
-    for kernel, types in kernels:
-        if (kernel, types) not in _helper.asked:
-            _helper.asked.append((kernel, types))
-            _helper.unsent.put(dumps((kernel.py_func.__module__, kernel.py_func.__qualname__, types)))
+    with _helper.lock:
+        if start and not _helper.runs() and _is_wanted():
+            _start()
+        if not _helper.runs():
+            return
+        for kernel, types in kernels:
+            if (kernel, types) not in _helper.asked:
+                _helper.asked.append((kernel, types))
+                _helper.waiting.append((kernel, types))
+                name = kernel.py_func.__module__, kernel.py_func.__qualname__
+                _helper.unsent.put(dumps((*name, types)))
 
 
 def not_begun() -> Iterator[_Request]:
     """Yield kernels asked for, also while more are asked for; each process begins each of them once."""
-    while _helper.begun < len(_helper.asked) or _receive(wait_s=0):
-        _helper.begun += 1
-        yield _helper.asked[_helper.begun - 1]
+    while _helper.waiting or _receive(wait_s=0):
+        yield _helper.waiting.popleft()
 
 
 def _is_wanted() -> bool:
@@ -126,27 +132,36 @@ def _start() -> None:
             stderr=subprocess.DEVNULL,
         )
         atexit.register(_helper.process.kill)
-        threading.Thread(target=_write_requests, args=(_helper.process,), daemon=True).start()
+        _helper.unsent.put(None)  # to a helper before, which has ended
+        _helper.asked, _helper.unsent = [], queue.SimpleQueue()
+        given = _helper.process, _helper.unsent
+        threading.Thread(target=_write_requests, args=given, daemon=True).start()
 
 
-def _write_requests(process: subprocess.Popen[bytes]) -> None:
+def _write_requests(process: subprocess.Popen[bytes], unsent: queue.SimpleQueue[bytes | None]) -> None:
     """Write what a helper is asked for: a pipe holds few requests, and the helper reads between kernels."""
     assert process.stdin is not None
     with suppress(OSError), Connection(os.dup(process.stdin.fileno()), readable=False) as requests:
-        while True:  # until it has ended
-            requests.send_bytes(_helper.unsent.get())
+        while (request := unsent.get()) is not None:
+            requests.send_bytes(request)
 
 
 def _receive(wait_s: float) -> bool:
-    """Return whether a helper was asked for one more kernel."""
-    try:
-        if _helper.requests is None or not _helper.requests.poll(wait_s):
+    """Return whether a helper was asked for one more kernel, of those that it can find."""
+    while _helper.requests is not None:
+        try:
+            if not _helper.requests.poll(wait_s):
+                return False
+            request = _helper.requests.recv_bytes()
+        except (EOFError, OSError):  # the other process has ended
             return False
-        module, name, types = pickle.loads(_helper.requests.recv_bytes())
-        _helper.asked.append((getattr(importlib.import_module(module), name), types))
-    except (EOFError, OSError):  # the other process has ended
-        return False
-    return True
+        with suppress(Exception):  # a kernel of a script or a function, or one that needs the environments
+            module, name, types = pickle.loads(request)
+            found = getattr(importlib.import_module(module), name), types
+            _helper.asked.append(found)
+            _helper.waiting.append(found)
+            return True
+    return False
 
 
 def serve() -> None:

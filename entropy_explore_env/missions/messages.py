@@ -66,7 +66,7 @@ class Team(NamedTuple):
     heard: np.ndarray
     """(A, A) HEARD."""
     faults: TeamFaults | None = None
-    """None = nothing goes wrong, like the next one known while compiling."""
+    """None = nothing goes wrong. All that may be None is known while compiling."""
     air: Air | None = None
     """What messages pass through; None = the channel reaches by distance alone."""
     localization: TeamLocalization | None = None

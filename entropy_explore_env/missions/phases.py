@@ -158,7 +158,7 @@ def broadcast(phases, team, maps, side, index, time_s, tracer, scan, recipients)
     """Send a robot's buffer; teammates that do not have it yet fuse it.
 
     Args:
-        side: Which of its two phases.
+        side: Which of its two buffers.
     """
     robots, robot, params = team.robots, team.robots[index], team.params
     batches, heard = phases.counts[index, side], phases.heard[index]

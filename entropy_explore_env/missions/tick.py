@@ -67,9 +67,9 @@ class Mission(NamedTuple):
     joint: JointMap
     latest: LatestScans
     in_flight: InFlight | None
-    """None = all messages arrive at once, like the next one known while compiling."""
+    """None = all messages arrive at once, which is known while compiling."""
     phases: TeamPhases | None
-    """None = batches are sent at once."""
+    """None = batches are sent at once, which is known while compiling."""
     truth: np.ndarray
     """(V,) float32."""
 

@@ -129,7 +129,7 @@ def test_constants_short_integers_and_fields_of_records_are_compiled_once():
     @kernel
     def calling(records, array, number):
         field = records[0].field
-        return plus(array, number, 1) + plus(field, np.int16(2), number) + plus(field, number, 3)
+        return plus(array, number, 1) + plus(field, np.int16(2), number) + plus(field, number, count=3)
 
     records = np.array([([4.0, 5.0],)], [("field", float, (2,))])
     assert calling(records, np.array([8.0]), 16) == (8 + 16 + 1) + (4 + 2 + 16) + (4 + 16 + 3)

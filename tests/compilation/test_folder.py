@@ -88,7 +88,7 @@ def test_the_second_waits_for_the_first(tmp_path):
 
 
 @needs_posix
-def test_who_does_not_wait_is_told_that_another_has_it(tmp_path):
+def test_a_process_that_does_not_wait_is_told_that_another_has_it(tmp_path):
     kernel = tmp_path / "a.kernel"
     first = claim(kernel, waits=False)
     with pytest.raises(folder.ClaimedError):

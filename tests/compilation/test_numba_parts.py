@@ -45,6 +45,7 @@ CPU_CODE = CONTEXT.codegen()
         (NativeLowering, ("run_pass",)),
         (types, ("unliteral", "signed_domain", "NestedArray", "Array")),
         (CPU_CODE, ("_tm", "_data_layout")),
+        (CONTEXT.typing_context.callstack, ("__len__",)),
         (llvm, ("parse_bitcode", "parse_assembly", "create_pass_builder", "create_pipeline_tuning_options")),
     ],
 )

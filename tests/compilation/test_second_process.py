@@ -2,9 +2,11 @@
 
 import os
 import time
+from pathlib import Path
 
 import pytest
 
+import entropy_explore_env
 from entropy_explore_env.compilation import second_process
 from tests.compilation.test_kernels import run, start
 from tests.systems import needs_posix
@@ -58,8 +60,78 @@ ASKED = """
 from numba import float64
 from others import later
 
-asked = second_process._helper.asked
-asked += [(caller, (float64,)), (later, (float64,))]
+second_process._helper.waiting += [(caller, (float64,)), (later, (float64,))]
+"""
+WITHIN_NJIT = """
+import numba
+
+@numba.njit
+def outer(x):
+    return caller(x)
+
+print(outer(1.0), caller(1.0))
+"""
+WITHOUT_STAMP = """
+from typing import NamedTuple
+from entropy_explore_env.compilation.kernels import lean_kernel
+
+class Given(NamedTuple):
+    x: float
+
+@lean_kernel
+def within(given):
+    return caller(given.x)
+
+@lean_kernel
+def outer(x):
+    return within(Given(x))
+
+print(outer(1.0), caller(1.0))
+"""
+BETWEEN = """
+import numba
+from entropy_explore_env.compilation.kernels import lean_kernel
+from mine import caller
+from others import later
+
+@numba.njit
+def between(x):
+    return caller(x)
+
+@lean_kernel
+def outer(x):
+    return between(x) + later(x) - later(x)
+"""
+NOT_FOUND = """
+from entropy_explore_env.compilation.kernels import lean_kernel
+
+@lean_kernel
+def of_the_script(x):
+    return x
+
+compile_ahead([(of_the_script, (1.0,)), (caller, (1,))])
+until_s = time.monotonic() + 100.0
+while len(list(Path("cache").rglob("mine.caller-*.kernel"))) < 2 and time.monotonic() < until_s:
+    time.sleep(0.05)
+print(len(list(Path("cache").rglob("mine.caller-*.kernel"))), flush=True)
+"""
+STARTED_AGAIN = f"""
+second_process._helper.process.kill()
+second_process._helper.process.wait()
+{NOT_FOUND}
+"""
+KERNELS_ALONE = """
+import sys
+from types import ModuleType
+
+package = sys.modules["entropy_explore_env"] = ModuleType("entropy_explore_env")
+package.__path__ = [{path!r}]
+from entropy_explore_env.missions.navigation import plan_missions
+from entropy_explore_env.missions.observation.observe import observe_missions
+from entropy_explore_env.missions.proposals import propose_missions, propose_to
+from entropy_explore_env.missions.tick import step_missions
+
+print(hasattr(package, "parallel_env"), step_missions.__name__)
 """
 STOPPED = """
 import os
@@ -147,6 +219,33 @@ def test_types_that_a_survey_has_inferred_are_not_inferred_again(folder):
         SHARING.format(serves=False) + COUNTED + "caller(1.0)\nprint(inferred.count('caller'))", folder
     )
     assert said == "2"  # which leaves it calls, and, now that they are compiled, its own types
+
+
+@pytest.mark.parametrize(
+    "code", [WITHIN_NJIT, WITHOUT_STAMP], ids=["in a function of Numba", "without a stamp"]
+)
+def test_within_an_inference_nothing_is_divided(folder, code):
+    total = f"{LEAVES + sum(range(LEAVES)):.1f}"
+    assert run(SHARING.format(serves=False) + code, folder) == f"{total} {total}"
+
+
+def test_functions_of_numba_between_kernels_are_inferred_as_a_whole(folder):
+    (folder / "others.py").write_text(OTHERS)
+    (folder / "between.py").write_text(BETWEEN)
+    said = run(SHARING.format(serves=False) + "from between import outer\nprint(outer(1.0))", folder)
+    assert said == f"{LEAVES + sum(range(LEAVES)):.1f}"
+
+
+@needs_posix
+@pytest.mark.parametrize("code", [NOT_FOUND, STARTED_AGAIN], ids=["after one not found", "by another helper"])
+def test_the_helper_compiles_what_it_is_asked_for_later(folder, code):
+    said = run(ASK.format(processors=2, patience_s=100.0) + code, folder)
+    assert said.splitlines()[-1] == "2"  # with a float, and with an integer
+
+
+def test_kernels_of_missions_do_not_need_the_environments(folder):
+    path = str(Path(entropy_explore_env.__file__).parent)
+    assert run(KERNELS_ALONE.format(path=path), folder) == "False step_missions"
 
 
 @needs_posix
