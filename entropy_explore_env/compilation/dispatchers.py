@@ -14,8 +14,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from typing import IO, Any
 
-from numba.extending import lower_cast
-
 from entropy_explore_env.compilation import announcement, cache, second_process
 from entropy_explore_env.compilation.folder import ClaimedError, claim, kernel_folder, release
 from entropy_explore_env.compilation.libraries import InnerLowering, OuterLowering, rebuilt_inner
@@ -34,7 +32,7 @@ from entropy_explore_env.compilation.numba_parts import (
     type_inference_stage,
     types,
 )
-from entropy_explore_env.compilation.shortcuts import shortcuts
+from entropy_explore_env.compilation.shortcuts import general_type, shortcuts
 from entropy_explore_env.compilation.stamps import forget_digests
 
 _WRAPPERS = {"no_cfunc_wrapper": True}
@@ -298,26 +296,6 @@ class _Form(CPUDispatcher):
         raise NotImplementedError
 
 
-def _general(kind: types.Type) -> types.Type:
-    """Return the type for which a kernel is compiled when it is called with this one.
-
-    Constants, short integers and fields of records have types of their own. Each would be compiled apart,
-    into code that does the same.
-    """
-    kind = types.unliteral(kind)
-    if isinstance(kind, types.NestedArray):
-        return types.Array(kind.dtype, kind.ndim, kind.layout)
-    if kind in types.signed_domain:
-        return types.int64
-    return kind
-
-
-@lower_cast(types.NestedArray, types.Array)
-def _field_to_array(context: Any, builder: Any, source: Any, target: Any, value: Any) -> Any:  # noqa: ANN401
-    """Return a field of a record as an array: Numba holds both in the same form."""
-    return value
-
-
 class InnerKernel(_Form):
     """A kernel as other kernels call it."""
 
@@ -334,7 +312,7 @@ class InnerKernel(_Form):
 
     def get_call_template(self, args: Any, kws: Any) -> Any:  # noqa: ANN401 - types of arguments
         """As Numba's, for general types; a survey only notes what would have to be compiled."""
-        args, kws = tuple(map(_general, args)), {name: _general(kind) for name, kind in kws.items()}
+        args, kws = tuple(map(general_type, args)), {name: general_type(kind) for name, kind in kws.items()}
         if _state.found is not None and len(self.typingctx.callstack) == 1:
             folded = tuple(self._compiler.fold_argument_types(args, kws)[1])
             if not self.is_ready(folded):

@@ -6,12 +6,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from numba.extending import lower_cast
+
 from entropy_explore_env.compilation.numba_parts import (
     BaseFunction,
     ConfigStack,
     default_mangler,
     type_inference_stage,
     typed_passes,
+    types,
 )
 
 _known: dict[tuple[Any, ...], Any] = {}
@@ -57,3 +60,23 @@ def shortcuts(target_context: Any, infer: Callable[..., Any]) -> Iterator[None]:
     finally:
         functions.get_call_type, typed_passes.type_inference_stage = _resolve, type_inference_stage
         del target_context.mangler
+
+
+def general_type(kind: types.Type) -> types.Type:
+    """Return the type for which a kernel is compiled when it is called with this one.
+
+    Constants, short integers and fields of records have types of their own. Each would be compiled apart,
+    into code that does the same.
+    """
+    kind = types.unliteral(kind)
+    if isinstance(kind, types.NestedArray):
+        return types.Array(kind.dtype, kind.ndim, kind.layout)
+    if kind in types.signed_domain:
+        return types.int64
+    return kind
+
+
+@lower_cast(types.NestedArray, types.Array)
+def _field_to_array(context: Any, builder: Any, source: Any, target: Any, value: Any) -> Any:  # noqa: ANN401
+    """Return a field of a record as an array: Numba holds both in the same form."""
+    return value

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.faults import next_stop, stops_counted
-from entropy_explore_env.missions.messages import next_message
+from entropy_explore_env.missions.in_flight import next_message, under_way
 from entropy_explore_env.missions.phases import broadcasts_made, next_broadcast
 
 NO_EVENT, MESSAGE_ARRIVES, BROADCAST_DUE, ROBOT_DUE, ROBOT_STOPS = range(5)
@@ -82,14 +82,3 @@ def events_handled(robots, in_flight, phases, faults):
     for robot in robots:
         handled += 4 * robot.scans + int(robot.deciding) + int(math.isinf(robot.redecide_s))
     return handled
-
-
-@lean_kernel
-def under_way(in_flight):
-    """Return the number of delayed messages that have not arrived."""
-    count = 0
-    if in_flight is None:  # known while compiling: nothing of the rest is compiled
-        return count
-    for message in in_flight.messages:
-        count += int(not math.isinf(message.due_s))
-    return count

@@ -86,32 +86,6 @@ class Tracer(NamedTuple):
     """(V,) float32, any map of the workspace; what it holds does not matter."""
 
 
-class InFlight(NamedTuple):
-    """The delayed messages of one mission: slices of MissionState."""
-
-    messages: np.ndarray
-    """(Q,) MESSAGE."""
-    recipients: np.ndarray
-    """(Q, A) bool."""
-    rays: np.ndarray
-    """(Q, B, 5) float64."""
-    covariances: np.ndarray
-    """(Q, 10) float64."""
-
-
-@lean_kernel
-def in_flight_of(slots, state, mission):
-    """Return the InFlight of a mission; None where all messages arrive at once."""
-    if slots is None:  # known while compiling: nothing of the rest is compiled
-        return None
-    return InFlight(
-        state.in_flight[mission],
-        state.in_flight_to[mission],
-        state.in_flight_rays[mission],
-        state.in_flight_covariances[mission],
-    )
-
-
 class Maps(NamedTuple):
     """The beliefs of one mission's robots, and the cells that they are pooled to."""
 
@@ -398,19 +372,3 @@ def receive(in_flight, team, maps, slot, tracer, scan):
                 copy_numbers(message.announced, heard.announced, 7)
             elif message.count >= 0:
                 hear_batch(team, maps, scan, mate, message.count)
-
-
-@lean_kernel
-def next_message(in_flight):
-    """Return (slot, time) of the next message that arrives, the earlier sent first; time inf if none."""
-    soonest, due_s = 0, math.inf
-    if in_flight is None:  # known while compiling: nothing of the rest is compiled
-        return soonest, due_s
-    messages = in_flight.messages
-    for slot in range(len(messages)):
-        due = messages[slot].due_s
-        if due < due_s or (
-            due == due_s and not math.isinf(due) and messages[slot].serial < messages[soonest].serial
-        ):
-            soonest, due_s = slot, due
-    return soonest, due_s

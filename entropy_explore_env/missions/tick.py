@@ -31,16 +31,9 @@ from entropy_explore_env.missions.events import (
     next_event,
 )
 from entropy_explore_env.missions.faults import faults_of, note_stop
+from entropy_explore_env.missions.in_flight import InFlight, in_flight_of
 from entropy_explore_env.missions.localization import estimate_of, localization_of, note_motion
-from entropy_explore_env.missions.messages import (
-    InFlight,
-    Maps,
-    Team,
-    Tracer,
-    announce,
-    in_flight_of,
-    receive,
-)
+from entropy_explore_env.missions.messages import Maps, Team, Tracer, announce, receive
 from entropy_explore_env.missions.own_maps import summaries_of
 from entropy_explore_env.missions.phases import TeamPhases, broadcast_all, phases_of
 from entropy_explore_env.missions.records import MissionEnd
