@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.belief.paths.planning import resume_search
+from entropy_explore_env.belief.paths.lattice import cell_of, standing_voxel
 from entropy_explore_env.belief.paths.search import extract_path
 from entropy_explore_env.belief.paths.string_pulling import Path, string_pull
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.planner.far_places import BitCount, fill_blocks, promised_around
+from entropy_explore_env.planner.far_places import (
+    NOT_REACHED,
+    BitCount,
+    FoundPaths,
+    fill_blocks,
+    place_of,
+    promised_around,
+)
 from entropy_explore_env.planner.memory import copy_numbers, distance_apart, value_of, worth_bits
-from entropy_explore_env.planner.nearby import evaluate
+from entropy_explore_env.planner.nearby import cost_of, evaluate, search_within
 from entropy_explore_env.planner.states import PlannerState
 from entropy_explore_env.planner.thresholds import FAR_PITCH_RAD, FIRST_RADIUS
 from entropy_explore_env.randomness import draw_gaussian, draw_uniform
-from entropy_explore_env.viewpoints.evaluation import travel_seconds, voxel_at
+from entropy_explore_env.viewpoints.evaluation import indices_at, travel_seconds, voxel_at
 from entropy_explore_env.viewpoints.expected_scan import expected_bits
 
 _DEPLETED = int(PlannerState.DEPLETED)
@@ -67,17 +74,21 @@ def _fill_far(proposer, situation, state, options):
     is left in other places. So a DEPLETED planner weighs each place by chance.
     """
     scratch, blocks, recipe, drive = proposer.scratch, proposer.blocks, proposer.recipe, proposer.drive
-    size, here, shape, at = situation.belief.size, situation.knowledge.pose, blocks.bits.shape, scratch.at
+    here, window, at = situation.knowledge.pose, blocks.window, scratch.at
+    paths = FoundPaths(scratch.search, proposer.lattice, situation.costs)
     worths, gazes, edge_m = scratch.worth[: recipe.far_places], recipe.far_gazes, proposer.exact.voxel_size_m
     rng, count = situation.experience.candidates_rng, 0
-    for i in range(shape[0]):
-        for j in range(shape[1]):
-            for k in range(shape[2]):
-                place = blocks.place[i, j, k]
-                bits = promised_around(blocks, i, j, k) if place >= 0 else 0.0
-                if bits > 0.0:
+    for i in range(window[0, 0], window[0, 1]):
+        for j in range(window[1, 0], window[1, 1]):
+            for k in range(window[2, 0], window[2, 1]):
+                bits = promised_around(blocks, i, j, k)
+                if bits <= 0.0:
+                    continue
+                place = place_of(paths, blocks, i, j, k)
+                if place != NOT_REACHED:
                     _put_at(proposer, situation, place, at)
-                    seconds = travel_seconds(scratch.search, size, drive, edge_m, here, at, proposer.reach)
+                    cost = cost_of(proposer, situation, at)
+                    seconds = travel_seconds(drive, edge_m, here, at, cost, proposer.reach)
                     worth = value_of(situation, bits, seconds)
                     if state == _DEPLETED:
                         worth *= draw_uniform(rng)
@@ -113,9 +124,8 @@ def propose_far(proposer, situation, state):
     count_of = BitCount(proposer.target_precision, proposer.exact.known_precision, recipe.behind)
     while True:
         radius = min(radius, everywhere)
-        resume_search(scratch.search, proposer.lattice, situation.costs, radius)
-        window = math.ceil(radius)
-        fill_blocks(scratch.search, belief, count_of, proposer.lattice.layer, start, window, proposer.blocks)
+        search_within(proposer, situation, radius)
+        fill_blocks(belief, count_of, start, math.ceil(radius), proposer.blocks)
         count, best = _fill_far(proposer, situation, state, far), 0.0
         if experience.going:
             copy_numbers(experience.goal, far[count].viewpoint)
@@ -141,7 +151,7 @@ def first_stop(proposer, situation, goal, stop):
     scratch, here, size = proposer.scratch, situation.knowledge.pose, situation.belief.size
     search, lattice, path = scratch.search, proposer.lattice, scratch.path
     copy_numbers(goal, stop)
-    count = extract_path(search, lattice, voxel_at(size, goal), path)
+    count = extract_path(search, lattice, cell_of(lattice, indices_at(size, goal)), path)
     if count == 0:
         return False
     reach = proposer.reach * _WITHIN
@@ -157,7 +167,8 @@ def first_stop(proposer, situation, goal, stop):
     if distance_apart(goal, here) <= reach:
         return True
     for number in range(count):
-        x, y, z = grid_index(size, path[number])
+        cell = grid_index(lattice.size, path[number])
+        x, y, z = cell if lattice.edge == 1 else standing_voxel(lattice, situation.costs, cell)[1]
         height = here[2] if lattice.layer >= 0 else z + 0.5
         away = (x + 0.5 - here[0]) ** 2 + (y + 0.5 - here[1]) ** 2 + (height - here[2]) ** 2
         beyond = math.sqrt(away) > reach

@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.fields import remaining_bits
-from entropy_explore_env.belief.paths.search import cost_to
+from entropy_explore_env.belief.paths.lattice import Costs, Lattice
+from entropy_explore_env.belief.paths.search import Search, length_to
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
@@ -34,101 +35,144 @@ class BitCount(NamedTuple):
     behind: float  # Bits that an opening promises, in multiples of its own
 
 
+class FoundPaths(NamedTuple):
+    """What a search for paths found."""
+
+    search: Search
+    lattice: Lattice
+    costs: Costs
+
+
 class Blocks(NamedTuple):
     """Blocks of a belief, I, J, K along the axes."""
 
     edge: int  # Voxels along a block's edge
     bits: np.ndarray  # (I, J, K) float64, remaining bits; 0 outside the window that was looked at
     promised: np.ndarray  # (I, J, K) float64, bits that openings and known voxels promise
-    place: np.ndarray  # (I, J, K) int64, known free voxel nearest to its centre, or NOT_REACHED
+    window: np.ndarray  # (3, 2) int64, first block of the window along each axis, and one past the last
+    free: np.ndarray  # (V,) bool, voxels of the window that are known to be free
 
 
 def new_blocks(shape: tuple[int, int, int], edge: int) -> Blocks:
     """Return memory for the blocks of a grid, with edges of up to `edge` voxels."""
     count = tuple(math.ceil(n / edge) for n in shape)
-    return Blocks(edge, np.zeros(count), np.zeros(count), np.full(count, NOT_REACHED, np.int64))
+    free = np.zeros(math.prod(shape), np.bool_)
+    return Blocks(edge, np.zeros(count), np.zeros(count), np.zeros((3, 2), np.int64), free)
+
+
+@lean_kernel
+def _mark_free(belief, known_precision, low, high, free):
+    """Fill in, from `low` up to, not including, `high`, which voxels are known to be free."""
+    mean, precision = belief.mean, belief.precision
+    for x in range(low[0], high[0]):
+        for y in range(low[1], high[1]):
+            first = flat_index(belief.size, x, y, low[2])
+            for offset in range(high[2] - low[2]):
+                voxel = np.uint64(first + offset)
+                free[voxel] = (precision[voxel] >= known_precision) & (mean[voxel] <= STOP_AT_COVERED)
 
 
 @inlined_kernel
-def _is_free(belief, known_precision, voxel):
-    """Return whether a voxel is known to be free."""
-    return belief.precision[voxel] >= known_precision and belief.mean[voxel] <= STOP_AT_COVERED
-
-
-@inlined_kernel
-def _is_opening(belief, known_precision, voxel, x, y, z):
+def _is_opening(free, size, voxel, x, y, z):
     """Return whether one of the six voxels beside an unknown one is known to be free."""
-    size, row, column = belief.size, belief.size[2], belief.size[1] * belief.size[2]
+    row, column = size[2], size[1] * size[2]
     return (
-        (z > 0 and _is_free(belief, known_precision, voxel - 1))
-        or (z < size[2] - 1 and _is_free(belief, known_precision, voxel + 1))
-        or (y > 0 and _is_free(belief, known_precision, voxel - row))
-        or (y < size[1] - 1 and _is_free(belief, known_precision, voxel + row))
-        or (x > 0 and _is_free(belief, known_precision, voxel - column))
-        or (x < size[0] - 1 and _is_free(belief, known_precision, voxel + column))
+        (z > 0 and free[np.uint64(voxel - 1)])
+        or (z < size[2] - 1 and free[np.uint64(voxel + 1)])
+        or (y > 0 and free[np.uint64(voxel - row)])
+        or (y < size[1] - 1 and free[np.uint64(voxel + row)])
+        or (x > 0 and free[np.uint64(voxel - column)])
+        or (x < size[0] - 1 and free[np.uint64(voxel + column)])
     )
 
 
 @inlined_kernel
-def _fill_block(search, belief, count, layer, low, high):
-    """Return (bits, promised, place) of the block of the voxels from `low` up to, not including, `high`."""
-    bits, promised, place, nearest = 0.0, 0.0, NOT_REACHED, math.inf
+def _bounds(blocks, size, i, j, k):
+    """Return (low, high) of a block: its voxels are those from `low` up to, not including, `high`."""
+    edge = blocks.edge
+    low = (i * edge, j * edge, k * edge)
+    return low, (min(low[0] + edge, size[0]), min(low[1] + edge, size[1]), min(low[2] + edge, size[2]))
+
+
+@inlined_kernel
+def _count_bits(belief, count, free, low, high):
+    """Return (bits, promised) of the block of the voxels from `low` up to, not including, `high`."""
+    bits, promised = 0.0, 0.0
     latest, left = np.float32(0.0), 0.0  # most voxels have the prior's precision: its logarithm is taken once
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
             for z in range(low[2], high[2]):
                 voxel = flat_index(belief.size, x, y, z)
-                if belief.mean[voxel] > STOP_AT_COVERED:
+                precision = belief.precision[np.uint64(voxel)]
+                if precision >= count.target_precision or belief.mean[np.uint64(voxel)] > STOP_AT_COVERED:
                     continue
-                known = belief.precision[voxel] >= count.known_precision
-                if belief.precision[voxel] < count.target_precision:
-                    if belief.precision[voxel] != latest:
-                        latest = belief.precision[voxel]
-                        left = remaining_bits(latest, count.target_precision)
-                    bits += left
-                    if known:
-                        promised += left
-                    elif _is_opening(belief, count.known_precision, voxel, x, y, z):
-                        promised += count.behind * left
-                if not known or (layer >= 0 and z != layer) or math.isinf(cost_to(search, voxel)):
-                    continue
+                if precision != latest:
+                    latest, left = precision, remaining_bits(precision, count.target_precision)
+                bits += left
+                if precision >= count.known_precision:
+                    promised += left
+                elif _is_opening(free, belief.size, voxel, x, y, z):
+                    promised += count.behind * left
+    return bits, promised
+
+
+@lean_kernel
+def fill_blocks(belief, count, start, radius, blocks):
+    """Fill in the bits of the blocks of a belief around a robot.
+
+    Args:
+        belief: A Belief.
+        count: A BitCount.
+        start: Voxel of the robot.
+        radius: Half an edge of the window of voxels that is looked at.
+        blocks: Blocks, filled in.
+    """
+    window, centre = blocks.window, grid_index(belief.size, start)
+    for axis in range(3):
+        window[axis, 0] = max((centre[axis] - radius) // blocks.edge, 0)
+        window[axis, 1] = min((centre[axis] + radius) // blocks.edge + 1, blocks.bits.shape[axis])
+    low = _bounds(blocks, belief.size, window[0, 0] - 1, window[1, 0] - 1, window[2, 0] - 1)[0]
+    high = _bounds(blocks, belief.size, window[0, 1], window[1, 1], window[2, 1])[1]
+    low = max(low[0], 0), max(low[1], 0), max(low[2], 0)
+    _mark_free(belief, count.known_precision, low, high, blocks.free)
+    blocks.bits[:], blocks.promised[:] = 0.0, 0.0
+    for i in range(window[0, 0], window[0, 1]):
+        for j in range(window[1, 0], window[1, 1]):
+            for k in range(window[2, 0], window[2, 1]):
+                low, high = _bounds(blocks, belief.size, i, j, k)
+                blocks.bits[i, j, k], blocks.promised[i, j, k] = _count_bits(
+                    belief, count, blocks.free, low, high
+                )
+
+
+@lean_kernel
+def place_of(paths, blocks, i, j, k):
+    """Return the voxel from which a block is looked at: see the top of this file; NOT_REACHED = none.
+
+    Args:
+        paths: FoundPaths from the robot.
+        blocks: Blocks, filled in; this one is in the window.
+        i: Number of the block along x.
+        j: Along y.
+        k: Along z.
+    """
+    size, layer = paths.lattice.grid, paths.lattice.layer
+    low, high = _bounds(blocks, size, i, j, k)
+    place, nearest = NOT_REACHED, math.inf
+    for x in range(low[0], high[0]):
+        for y in range(low[1], high[1]):
+            for z in range(low[2], high[2]):
                 away = (
                     (2 * x + 1 - low[0] - high[0]) ** 2
                     + (2 * y + 1 - low[1] - high[1]) ** 2
                     + (2 * z + 1 - low[2] - high[2]) ** 2
                 )
-                if away < nearest:
+                voxel = flat_index(size, x, y, z)
+                if away >= nearest or not blocks.free[voxel] or (layer >= 0 and z != layer):
+                    continue
+                if length_to(paths.search, paths.lattice, paths.costs, (x, y, z)) < math.inf:
                     nearest, place = away, voxel
-    return bits, promised, place
-
-
-@lean_kernel
-def fill_blocks(search, belief, count, layer, start, radius, blocks):
-    """Fill in the blocks of a belief around a robot after a search for paths.
-
-    Args:
-        search: The latest search.
-        belief: A Belief.
-        count: A BitCount.
-        layer: The layer of a planar robot, from which alone places are taken; -1 = it flies.
-        start: Voxel of the robot.
-        radius: Half an edge of the window of voxels that is looked at; no path was searched beyond.
-        blocks: Blocks, filled in.
-    """
-    size, edge, centre = belief.size, blocks.edge, grid_index(belief.size, start)
-    for i in range(blocks.bits.shape[0]):
-        for j in range(blocks.bits.shape[1]):
-            for k in range(blocks.bits.shape[2]):
-                low = (i * edge, j * edge, k * edge)
-                high = (min(low[0] + edge, size[0]), min(low[1] + edge, size[1]), min(low[2] + edge, size[2]))
-                inside = True
-                for axis in range(3):
-                    inside &= low[axis] <= centre[axis] + radius and high[axis] > centre[axis] - radius
-                bits, promised, place = 0.0, 0.0, NOT_REACHED
-                if inside:
-                    bits, promised, place = _fill_block(search, belief, count, layer, low, high)
-                blocks.bits[i, j, k], blocks.promised[i, j, k] = bits, promised
-                blocks.place[i, j, k] = place
+    return place
 
 
 @lean_kernel

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from entropy_explore_env.belief.paths.search import cost_to
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.planner.candidate_features import COLUMNS, CONTEXT_COLUMNS, FEATURES
 from entropy_explore_env.planner.far_places import bits_around
 from entropy_explore_env.planner.memory import distance_apart
+from entropy_explore_env.planner.nearby import cost_of
 from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.robots.motion import driving_time
-from entropy_explore_env.viewpoints.evaluation import STRAIGHTENED, voxel_at
+from entropy_explore_env.viewpoints.evaluation import STRAIGHTENED
 
 _SPOT, _FAR = int(Kind.SPOT), int(Kind.FAR)
 _WIDTH = len(FEATURES)
@@ -45,7 +45,7 @@ def _path_length(proposer, situation, goal, kind):
     """Return the length of the path to a goal in voxel edges, straight where the robot drives so."""
     straight = distance_apart(goal, situation.knowledge.pose)
     if straight > 1e-9 and (proposer.planned or kind == _FAR):
-        cost = cost_to(proposer.scratch.search, voxel_at(situation.belief.size, goal))
+        cost = cost_of(proposer, situation, goal)
         if cost < math.inf:
             return max(straight, STRAIGHTENED * cost)
     return straight
@@ -134,7 +134,7 @@ def _write_view(proposer, k, row):
     """Fill in the features of what candidate k should see."""
     scratch = proposer.scratch
     view, longest = scratch.views[k], proposer.exact.max_range_m / proposer.exact.voxel_size_m
-    longest, seen = min(longest, _diagonal(proposer.lattice.size)), max(view.seen, 1)
+    longest, seen = min(longest, _diagonal(proposer.lattice.grid)), max(view.seen, 1)
     row[_AGAIN] = clip(view.again_bits / view.bits)
     row[_UNIQUE] = clip(view.unique / seen)
     row[_COMMON] = clip(scratch.common[k, 0] / seen) if k > 0 else 1.0

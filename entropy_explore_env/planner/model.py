@@ -13,14 +13,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.fields import Belief
-from entropy_explore_env.belief.paths.lattice import Costs, Lattice
+from entropy_explore_env.belief.paths.lattice import Costs, Lattice, longest_edge, new_lattice
 from entropy_explore_env.belief.paths.search import Search, new_search
 from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.planner.far_places import Blocks, new_blocks
 from entropy_explore_env.planner.recipe import Recipe, angular_spread, recipe_for
 from entropy_explore_env.planner.records import KNOWLEDGE, MATE, OPTION, VIEW
-from entropy_explore_env.planner.thresholds import REFINED_AROUND
+from entropy_explore_env.planner.thresholds import CELLS_WITHIN, REFINED_AROUND
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import DriveModel, robot_model, sees_all_around
@@ -78,7 +78,7 @@ class Proposer(NamedTuple):
     drawn: ScanModel  # How scans at drawn viewpoints are imagined
     exact: ScanModel  # How scans are imagined with all rays
     drive: DriveModel
-    lattice: Lattice
+    lattice: Lattice  # Steps between cells, in which paths are searched
     planar: bool
     level: bool  # Whether it never looks up or down
     planned: bool  # Whether it drives along planned paths, not straight
@@ -154,6 +154,16 @@ def new_proposers(scenario: Scenario, recipe: Recipe | None = None) -> list[Prop
     return [_proposer(scenario, kind, of_kind, scratch) for kind, of_kind in pairs]
 
 
+def _cell_edge(within: float, body_radius: float) -> int:
+    """Return the edge of the cells in which a flying robot searches paths.
+
+    Args:
+        within: Largest distance at which places are drawn, in voxel edges.
+        body_radius: Radius of the body, in voxel edges; the larger it is, the longer edges may be.
+    """
+    return max(1, min(longest_edge(body_radius), int(within / CELLS_WITHIN)))
+
+
 def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: ProposalScratch) -> Proposer:
     grid, robot, sensor = scenario.grid, kind.robot, kind.sensor
     drawn, exact = (
@@ -162,18 +172,21 @@ def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: Prop
     )
     planar, reach = scenario.layer_of(robot) is not None, robot.reach_m / grid.voxel_size_m
     width, height = sensor.field_of_view_rad
+    within = float(min(reach, 0.25 * max(grid.shape)))
+    edge = 1 if planar or robot.navigator != "planned" else _cell_edge(within, exact.drive.body_radius)
+    lattice = new_lattice(grid.shape, exact.drive.body_radius, scenario.layer_of(robot), edge)
     return Proposer(
         recipe=recipe,
         drawn=drawn.scan,
         exact=exact.scan,
         drive=exact.drive,
-        lattice=exact.lattice,
+        lattice=lattice,
         planar=planar,
         level=bool(scenario.looks_level(robot)),
         planned=robot.navigator == "planned",
         all_around=bool(sees_all_around(sensor)),
         axes=2 if planar else 3,
-        within=float(min(reach, 0.25 * max(grid.shape))),
+        within=within,
         reach=float(min(reach, sum(grid.shape))),
         view_rad=(float(width), float(height)),
         view_width_rad=float(max(width, height, sensor.angular_step_rad)),

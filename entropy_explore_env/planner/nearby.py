@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 
+from entropy_explore_env.belief.paths.lattice import cell_of
 from entropy_explore_env.belief.paths.planning import resume_search, start_search
+from entropy_explore_env.belief.paths.search import length_to
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.planner.memory import copy_numbers, value_of, worth_bits
 from entropy_explore_env.planner.records import Kind
@@ -17,7 +19,7 @@ from entropy_explore_env.planner.thresholds import (
     YAW_SPREAD,
 )
 from entropy_explore_env.randomness import draw_gaussian, draw_uniform
-from entropy_explore_env.viewpoints.evaluation import straight_seconds, travel_seconds, voxel_at
+from entropy_explore_env.viewpoints.evaluation import indices_at, straight_seconds, travel_seconds
 from entropy_explore_env.viewpoints.expected_scan import expected_bits
 
 _SPOT, _NEAR = int(Kind.SPOT), int(Kind.NEAR)
@@ -26,11 +28,24 @@ _SPOT, _NEAR = int(Kind.SPOT), int(Kind.NEAR)
 @lean_kernel
 def start_paths(proposer, situation):
     """Begin a search for paths from where the robot is, and search what lies within reach."""
-    scratch = proposer.scratch
-    scratch.source[0] = voxel_at(situation.belief.size, situation.knowledge.pose)
-    start_search(scratch.search, proposer.lattice, situation.costs, scratch.source)
-    farthest = PATHS_WITHIN * proposer.within + 1.0
-    resume_search(scratch.search, proposer.lattice, situation.costs, farthest)
+    scratch, lattice = proposer.scratch, proposer.lattice
+    scratch.source[0] = cell_of(lattice, indices_at(lattice.grid, situation.knowledge.pose))
+    start_search(scratch.search, lattice, situation.costs, scratch.source)
+    search_within(proposer, situation, PATHS_WITHIN * proposer.within + 1.0)
+
+
+@lean_kernel
+def search_within(proposer, situation, length):
+    """Continue the search until the cheapest paths up to a length in voxel edges are found."""
+    lattice = proposer.lattice
+    resume_search(proposer.scratch.search, lattice, situation.costs, length / lattice.edge)
+
+
+@lean_kernel
+def cost_of(proposer, situation, at):
+    """Return the cost, in voxel edges, of the path to a place that the search found; inf = none."""
+    lattice = proposer.lattice
+    return length_to(proposer.scratch.search, lattice, situation.costs, indices_at(lattice.grid, at))
 
 
 @lean_kernel
@@ -127,7 +142,8 @@ def evaluate(proposer, situation, scan, options, far):
         option = options[k]
         at = option.viewpoint
         if along_paths:
-            option.seconds = travel_seconds(scratch.search, belief.size, drive, edge_m, here, at, reach)
+            cost = cost_of(proposer, situation, at)
+            option.seconds = travel_seconds(drive, edge_m, here, at, cost, reach)
         else:
             option.seconds = straight_seconds(belief, edge_m, drive, here, at, scratch.scan)
         bits = expected_bits(belief, scan, at, scratch.scan)

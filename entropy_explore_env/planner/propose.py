@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.belief.paths.search import cost_to
 from entropy_explore_env.belief.visibility import mark_cones
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.planner.far import first_stop, gaze_on_the_way, propose_far
@@ -22,7 +21,13 @@ from entropy_explore_env.planner.memory import (
     trust_and_clearance,
     weigh_time,
 )
-from entropy_explore_env.planner.nearby import draw_viewpoint, evaluate, propose_nearby, start_paths
+from entropy_explore_env.planner.nearby import (
+    cost_of,
+    draw_viewpoint,
+    evaluate,
+    propose_nearby,
+    start_paths,
+)
 from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.planner.selection import most_far_of, select
 from entropy_explore_env.planner.states import PlannerState, next_state
@@ -35,7 +40,6 @@ from entropy_explore_env.planner.thresholds import (
     TRIED_STOPS,
 )
 from entropy_explore_env.randomness import draw_uniform
-from entropy_explore_env.viewpoints.evaluation import voxel_at
 from entropy_explore_env.viewpoints.expected_scan import expected_bits
 
 _NONE, _SPOT, _NEAR, _FAR = int(Kind.NONE), int(Kind.SPOT), int(Kind.NEAR), int(Kind.FAR)
@@ -112,7 +116,7 @@ def _is_reached(proposer, situation, at):
     for axis in range(3):
         if not 0.0 < at[axis] < size[axis]:
             return False
-    return cost_to(proposer.scratch.search, voxel_at(size, at)) < math.inf
+    return cost_of(proposer, situation, at) < math.inf
 
 
 @lean_kernel

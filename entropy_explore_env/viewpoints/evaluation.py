@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, Lattice, new_lattice
-from entropy_explore_env.belief.paths.search import cost_to
 from entropy_explore_env.belief.raycast import (
     NONE_BEHIND,
     OPEN,
@@ -183,16 +182,16 @@ def straight_seconds(belief, voxel_size_m, drive, here, at, scratch):
 
 
 @lean_kernel
-def travel_seconds(search, size, drive, voxel_size_m, here, at, reach):
-    """Return the seconds until the scan at a viewpoint (5,) is taken, on the path that a search found.
+def travel_seconds(drive, voxel_size_m, here, at, cost, reach):
+    """Return the seconds until the scan at a viewpoint (5,) is taken, on a path from `here` (5,).
 
-    The latest search began in the voxel of the robot, which is `here` (5,); seconds are inf where it did not
-    come. A hop is no longer than `reach` voxel edges, with a scan after each; inf allowed.
+    The path's cost is that of its steps, in voxel edges; seconds are inf where that is. A hop is no longer
+    than `reach` voxel edges, with a scan after each; inf allowed.
     """
     straight = math.sqrt((at[0] - here[0]) ** 2 + (at[1] - here[1]) ** 2 + (at[2] - here[2]) ** 2)
     length = 0.0
     if straight > 1e-9:
-        length = max(straight, STRAIGHTENED * cost_to(search, voxel_at(size, at)))
+        length = max(straight, STRAIGHTENED * cost)
     if math.isinf(length):
         return math.inf
     hops = max(math.ceil(length / reach - 1e-9), 1)
@@ -202,7 +201,14 @@ def travel_seconds(search, size, drive, voxel_size_m, here, at, reach):
 @lean_kernel
 def voxel_at(size, at):
     """Return the number of the voxel of a place in the workspace, grid units."""
+    x, y, z = indices_at(size, at)
+    return flat_index(size, x, y, z)
+
+
+@inlined_kernel
+def indices_at(size, at):
+    """Return the indices (x, y, z) of the voxel of a place in the workspace, grid units."""
     x = min(max(int(at[0]), 0), size[0] - 1)
     y = min(max(int(at[1]), 0), size[1] - 1)
     z = min(max(int(at[2]), 0), size[2] - 1)
-    return flat_index(size, x, y, z)
+    return x, y, z

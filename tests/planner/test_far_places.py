@@ -15,9 +15,11 @@ from entropy_explore_env.belief.paths.search import cost_to, new_search
 from entropy_explore_env.planner.far_places import (
     NOT_REACHED,
     BitCount,
+    FoundPaths,
     bits_around,
     fill_blocks,
     new_blocks,
+    place_of,
     promised_around,
 )
 from tests.reference.scenes import random_belief
@@ -46,12 +48,14 @@ def test_blocks_are_those_of_a_slow_count(seed, layer):
     search, lattice = new_search(mean.size), new_lattice(SIZE, 0.0, None if layer < 0 else layer)
     start = int(np.ravel_multi_index((3, 5, 3), SIZE))
     source = np.array([start], np.int32)
-    search_paths(search, lattice, belief_costs(mean, precision, 1e-3), source, ANY_GOAL, math.inf)
+    costs = belief_costs(mean, precision, 1e-3)
+    search_paths(search, lattice, costs, source, ANY_GOAL, math.inf)
     blocks, radius = new_blocks(SIZE, EDGE), 3
     belief = Belief(mean.reshape(-1), precision.reshape(-1), SIZE)
-    fill_blocks(search, belief, BitCount(TARGET, seen, BEHIND), layer, start, radius, blocks)
-    assert blocks.bits.shape == (3, 4, 2) and (blocks.place > NOT_REACHED).any()
-    both = 0
+    fill_blocks(belief, BitCount(TARGET, seen, BEHIND), start, radius, blocks)
+    paths = FoundPaths(search, lattice, costs)
+    assert blocks.bits.shape == (3, 4, 2)
+    both, places = 0, 0
     for index in itertools.product(*map(range, blocks.bits.shape)):
         low = np.array(index) * EDGE
         high = np.minimum(low + EDGE, SIZE)
@@ -69,16 +73,19 @@ def test_blocks_are_those_of_a_slow_count(seed, layer):
                 number = int(np.ravel_multi_index(voxel, SIZE))
                 if known and (layer < 0 or voxel[2] == layer) and math.isfinite(cost_to(search, number)):
                     reached[number] = float(((np.array(voxel) + 0.5 - (low + high) / 2) ** 2).sum())
+        within = zip(index, blocks.window, strict=True)
+        assert outside != all(first <= number < last for number, (first, last) in within)
         if outside:
             bits, promised, reached = 0.0, 0.0, {}
         assert blocks.bits[index] == pytest.approx(bits, rel=1e-6, abs=1e-9)
         assert blocks.promised[index] == pytest.approx(promised, rel=1e-6, abs=1e-9)
         both += int(0.0 < promised < bits)
-        place = int(blocks.place[index])
+        place = place_of(paths, blocks, *index) if not outside else NOT_REACHED
         assert (place == NOT_REACHED) == (not reached)
+        places += bool(reached)
         if reached:
             assert reached[place] == min(reached.values())
-    assert both >= 3
+    assert both >= 3 and places >= 1
 
 
 def test_the_bits_around_a_block_are_those_of_it_and_its_neighbours():

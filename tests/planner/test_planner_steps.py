@@ -13,14 +13,15 @@ from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.planner.far import first_stop, propose_far
 from entropy_explore_env.planner.memory import trust_and_clearance, worth_bits
 from entropy_explore_env.planner.model import Situation, new_proposers
-from entropy_explore_env.planner.nearby import propose_nearby, start_paths
+from entropy_explore_env.planner.nearby import cost_of, propose_nearby, start_paths
 from entropy_explore_env.planner.propose import choose
 from entropy_explore_env.planner.recipe import ALL_AROUND, NARROW_PLANNED, NARROW_STRAIGHT
 from entropy_explore_env.planner.records import EXPERIENCE, KNOWLEDGE, MATE, Kind
 from entropy_explore_env.planner.states import PlannerState
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.settings.scenarios import BOX, OFFICE
+from entropy_explore_env.settings.scenarios import BOX, OFFICE, OFFICE_3D
+from entropy_explore_env.worlds.world import World
 
 ACTION = {"kind": "candidates", "candidates": 1}
 PLAN = with_settings(
@@ -222,3 +223,42 @@ def test_each_kind_has_its_recipe():
     given = new_proposers(PLAN, NARROW_STRAIGHT)[0].recipe
     assert given.exponent == NARROW_STRAIGHT.exponent and given.turns == NARROW_STRAIGHT.turns
     assert new_proposers(PLAN)[0].recipe.exponent == ALL_AROUND.exponent
+
+
+def drone_in_a_hall():
+    """A drone at one end of a hall of 100 × 30 × 12 voxels, half of it known, with a wall but for a door."""
+    drone = {"body_radius_m": 0.3, "reach_m": 8.0}
+    grid, sensor = Grid((100, 30, 12), 0.1), {"field_of_view_rad": (2.0 * math.pi, 0.5)}
+    hall = with_settings(OFFICE_3D, {"grid": grid, "robot": drone, "sensor": sensor, "action": ACTION})
+    mean, precision = np.full(grid.shape, 0.5), np.full(grid.shape, UNKNOWN)
+    mean[:60], precision[:60] = 0.0, 2000.0
+    mean[30, :20] = 1.0
+    here = np.array([8.5, 6.5, 5.5, 0.0, 0.0])
+    return hall, situation_of(hall, mean, precision, here, most_bits=1e9)
+
+
+def test_drones_in_fine_grids_search_paths_in_cells_and_stop_where_they_fit(monkeypatch):
+    monkeypatch.setattr("entropy_explore_env.planner.model.CELLS_WITHIN", 8)
+    hall, situation = drone_in_a_hall()
+    proposer = new_proposers(hall)[0]
+    assert proposer.lattice.edge == 3 and proposer.lattice.grid == hall.grid.shape
+    start_paths(proposer, situation)
+    count, best = propose_far(proposer, situation, EXPLORING)
+    goals = proposer.scratch.far["viewpoint"][:count]
+    assert count > 0 and best > 0.0 and (goals[:, 0] > 31.0).any()
+    covered = situation.belief.mean.reshape(hall.grid.shape) > 0.5
+    blocked = World(hall.grid, covered, "hall").collision_mask(0.3) > 0
+    stop = np.zeros(5)
+    for goal in goals:
+        assert first_stop(proposer, situation, goal, stop)
+        assert not blocked[tuple(stop[:3].astype(int))] and not blocked[tuple(goal[:3].astype(int))]
+    behind = next(goal for goal in goals if goal[0] > 31.0)
+    straight = np.linalg.norm(behind[:3] - situation.knowledge["pose"][:3])
+    around = math.dist((8.5, 6.5), (30.5, 23.0)) + math.dist((30.5, 23.0), tuple(behind[:2]))
+    assert cost_of(proposer, situation, behind) > max(straight, around) * 0.95
+    assert math.isinf(cost_of(proposer, situation, np.array([30.5, 6.5, 5.5, 0.0, 0.0])))
+
+
+def test_cells_are_voxels_where_reaches_are_short():
+    hall, _ = drone_in_a_hall()
+    assert new_proposers(hall)[0].lattice.edge == 1

@@ -10,7 +10,7 @@ import pytest
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
-from entropy_explore_env.belief.paths.search import new_search
+from entropy_explore_env.belief.paths.search import cost_to, new_search
 from entropy_explore_env.settings.scenarios import BOX
 from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.viewpoints.evaluation import (
@@ -21,6 +21,7 @@ from entropy_explore_env.viewpoints.evaluation import (
     sees_all_around,
     straight_seconds,
     travel_seconds,
+    voxel_at,
 )
 from entropy_explore_env.viewpoints.expected_scan import new_scan_scratch
 
@@ -85,7 +86,8 @@ def search():
 
 def seconds_of(search, viewpoints, reach=math.inf):
     here = np.array([1.5, 1.5, 0.5, 0.0, 0.0])
-    return [travel_seconds(search, WALLED, DRIVE, EDGE_M, here, np.array(at), reach) for at in viewpoints]
+    places = [(np.array(at), cost_to(search, voxel_at(WALLED, at))) for at in viewpoints]
+    return [travel_seconds(DRIVE, EDGE_M, here, at, cost, reach) for at, cost in places]
 
 
 def test_seconds_are_those_of_the_longer_of_drive_and_turn_and_of_the_scan(search):

@@ -4,6 +4,10 @@ A step costs its length times the mean of its two voxels' traversal costs: the i
 straight line between the centres. The traversal cost of a voxel, per voxel edge, is 1 where it is believed
 free and `unknown_cost` where it is unknown. A voxel is impassable if it is believed covered, if the body does
 not fit in it, or if it lies in the no-fly mask.
+
+A lattice may be coarser than the grid: its steps then lead between cells of some voxels along each axis, and
+costs are in edges of cells. A cell is passable if the body fits in one of its voxels, and free or unknown as
+the first of those is. In `classify_voxel`, voxels are those of the grid; in searches they are cells.
 """
 
 from __future__ import annotations
@@ -15,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
+from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel, record_type
 from entropy_explore_env.errors import SettingError
 
@@ -71,6 +76,10 @@ class Lattice(NamedTuple):
     """How many voxels with consecutive numbers are classified together: a power of two."""
     margin: tuple[int, int, int]
     """Layers at either end of each axis in which the body would touch the boundary."""
+    edge: int
+    """Voxels of the grid along a cell's edge; 1 = cells are voxels."""
+    grid: tuple[int, int, int]
+    """Voxels of the grid along x, y and z."""
 
 
 class Costs(NamedTuple):
@@ -95,7 +104,9 @@ class Costs(NamedTuple):
     """(V,) bool: voxels that may not be entered, whatever is believed; empty = none. Used with a belief."""
 
 
-def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: int | None = None) -> Lattice:
+def new_lattice(
+    shape: tuple[int, int, int], body_radius: float = 0.0, layer: int | None = None, edge: int = 1
+) -> Lattice:
     """Return the steps of a ball-shaped body in a workspace.
 
     A diagonal step is possible only if every voxel at the edges that it crosses is passable. The body fits
@@ -106,6 +117,7 @@ def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: in
         shape: (X, Y, Z) voxels.
         body_radius: In voxel edges.
         layer: The only voxel layer that is searched (planar robots); None = all of them.
+        edge: Voxels along a cell's edge; 1 where there is a layer.
 
     Raises:
         SettingError: The radius is not a finite number ≥ 0 or is too large, or there is no such layer.
@@ -115,9 +127,9 @@ def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: in
     if layer is not None and not 0 <= layer < shape[2]:
         raise SettingError("layer", layer, f"None or a whole number from 0 to {shape[2] - 1}")
     layer = 0 if shape[2] == 1 else layer
-    body = _footprint(shape, body_radius, layer)
+    body, cells = _footprint(shape, body_radius, layer), tuple(-(-n // edge) for n in shape)
     extent = int(body.max(initial=0))
-    strides = np.array([shape[1] * shape[2], shape[2], 1], np.int64)
+    strides, of_cells = (np.array([n[1] * n[2], n[2], 1], np.int64) for n in (shape, cells))
     steps: list[tuple[int, ...]] = [
         s for s in itertools.product((-1, 0, 1), repeat=3) if any(s) and (layer is None or s[2] == 0)
     ]
@@ -127,21 +139,39 @@ def new_lattice(shape: tuple[int, int, int], body_radius: float = 0.0, layer: in
     for move, step in zip(moves, steps, strict=True):
         new = _newly_touched(body, step)
         sides = itertools.product(*({0, axis} for axis in step))
-        move["step"], move["code"], move["offset"] = step, _code(step), np.dot(strides, step)
+        move["step"], move["code"], move["offset"] = step, _code(step), np.dot(of_cells, step)
         move["length"] = DIAGONALS[sum(map(abs, step)) - 1]
         move["needs"] = sum(1 << steps.index((x, y, z)) for x, y, z in sides if x or y or z)
         move["first"], move["last"] = first, first + len(new)
         first += len(new)
         offsets.append(new)
     return Lattice(
-        (int(shape[0]), int(shape[1]), int(shape[2])),
+        (int(cells[0]), int(cells[1]), int(cells[2])),
         -1 if layer is None else layer,
         moves,
         np.concatenate(offsets) @ strides,
         body,
-        _BLOCK_VOXELS if not len(body) and (layer is None or shape[2] == 1) else 1,
+        _BLOCK_VOXELS if not len(body) and edge == 1 and (layer is None or shape[2] == 1) else 1,
         (extent, extent, extent if layer is None else 0),
+        edge,
+        (int(shape[0]), int(shape[1]), int(shape[2])),
     )
+
+
+def longest_edge(body_radius: float) -> int:
+    """Return the longest edge of cells between which no steps lead through a wall, in voxels.
+
+    The centres of voxels in two cells that share a face are at most ((2 edge - 1)² + 2 (edge - 1)²)^½ apart,
+    those in which the body fits on either side of a wall at least twice its radius; diagonal steps are
+    possible only where steps along the axes lead to the same cell.
+
+    Args:
+        body_radius: In voxel edges.
+    """
+    edge = 1
+    while (2 * edge + 1) ** 2 + 2 * edge**2 < 4.0 * body_radius**2:
+        edge += 1
+    return edge
 
 
 def _code(step: tuple[int, ...]) -> int:
@@ -240,7 +270,7 @@ def classify_voxel(lattice, costs, voxel, x, y, z, first, last):
         return FREE if costs.per_edge[voxel] < math.inf else IMPASSABLE
     if costs.mean[voxel] > STOP_AT_COVERED or in_no_fly(costs, voxel):
         return IMPASSABLE
-    size, margin = lattice.size, lattice.margin
+    size, margin = lattice.grid, lattice.margin
     if x < margin[0] or y < margin[1] or z < margin[2]:
         return IMPASSABLE
     if x >= size[0] - margin[0] or y >= size[1] - margin[1] or z >= size[2] - margin[2]:
@@ -249,6 +279,30 @@ def classify_voxel(lattice, costs, voxel, x, y, z, first, last):
         if costs.mean[voxel + lattice.footprint_offsets[i]] > STOP_AT_COVERED:
             return IMPASSABLE
     return UNKNOWN if costs.precision[voxel] < costs.known_precision else FREE
+
+
+@inlined_kernel
+def cell_of(lattice, voxel):
+    """Return the number of the cell that holds a voxel, at indices (x, y, z) of the grid."""
+    edge = lattice.edge
+    return flat_index(lattice.size, voxel[0] // edge, voxel[1] // edge, voxel[2] // edge)
+
+
+@lean_kernel
+def standing_voxel(lattice, costs, cell):
+    """Return (kind, voxel): the class of a cell, and the first of its voxels in which the body fits.
+
+    Cell and voxel are indices (x, y, z). Where the body fits in none, the voxel is the cell's first one.
+    """
+    edge, grid, body = lattice.edge, lattice.grid, len(lattice.footprint)
+    first = (cell[0] * edge, cell[1] * edge, cell[2] * edge)
+    for x in range(first[0], min(first[0] + edge, grid[0])):
+        for y in range(first[1], min(first[1] + edge, grid[1])):
+            for z in range(first[2], min(first[2] + edge, grid[2])):
+                kind = classify_voxel(lattice, costs, flat_index(grid, x, y, z), x, y, z, 0, body)
+                if kind != IMPASSABLE:
+                    return kind, (x, y, z)
+    return IMPASSABLE, first
 
 
 @lean_kernel

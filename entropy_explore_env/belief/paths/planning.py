@@ -26,6 +26,7 @@ from entropy_explore_env.belief.paths.lattice import (
     FREE,
     IMPASSABLE,
     UNKNOWN,
+    cell_of,
     classify_voxel,
     in_no_fly,
 )
@@ -78,17 +79,17 @@ def _octile_distance(a, b):
 @lean_kernel
 def _open_exits(search, lattice, costs, voxel):
     """Let a body that does not fit where it starts leave through the uncovered voxels of its footprint."""
-    number, size = search.searches[0], lattice.size
-    x, y, z = grid_index(size, voxel)
+    number, grid, edge = search.searches[0], lattice.grid, lattice.edge
+    x, y, z = grid_index(lattice.size, voxel)
     for offset in lattice.footprint:
-        i, j, k = x + offset[0], y + offset[1], z + offset[2]
-        if 0 <= i < size[0] and 0 <= j < size[1] and 0 <= k < size[2]:
-            near = flat_index(size, i, j, k)
+        i, j, k = x * edge + offset[0], y * edge + offset[1], z * edge + offset[2]
+        if 0 <= i < grid[0] and 0 <= j < grid[1] and 0 <= k < grid[2]:
+            near, touched = cell_of(lattice, (i, j, k)), flat_index(grid, i, j, k)
             if near != voxel and (lattice.layer < 0 or k == lattice.layer):
-                mark = mark_of(search, lattice, costs, near, i, j, k)
-                uncovered = costs.mean[near] <= STOP_AT_COVERED and not in_no_fly(costs, near)
+                mark = mark_of(search, lattice, costs, near, i // edge, j // edge, k // edge)
+                uncovered = costs.mean[touched] <= STOP_AT_COVERED and not in_no_fly(costs, touched)
                 if mark & KIND == IMPASSABLE and uncovered:
-                    kind = UNKNOWN if costs.precision[near] < costs.known_precision else FREE
+                    kind = UNKNOWN if costs.precision[touched] < costs.known_precision else FREE
                     search.mark[near] = np.uint32(number << SEARCH_SHIFT | TIGHT | kind)
 
 
@@ -144,7 +145,7 @@ def _neighbours(search, lattice, costs, voxel, x, y, z):
             move = moves[k]
             near, step = voxel + move.offset, move.step
             at = (x + step[0], y + step[1], z + step[2])
-            if fits and lattice.block_voxels == 1:
+            if fits and lattice.block_voxels == 1 and lattice.edge == 1:
                 kind = classify_voxel(lattice, costs, near, at[0], at[1], at[2], move.first, move.last)
                 marks[near] = np.uint32(number << SEARCH_SHIFT | kind)
             else:

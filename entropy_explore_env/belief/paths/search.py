@@ -11,7 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.paths.bucket_queue import BucketQueue, new_queue
-from entropy_explore_env.belief.paths.lattice import IMPASSABLE, UNKNOWN, classify_range, classify_voxel
+from entropy_explore_env.belief.paths.lattice import (
+    IMPASSABLE,
+    UNKNOWN,
+    cell_of,
+    classify_range,
+    classify_voxel,
+    standing_voxel,
+)
+from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 # A voxel's mark: bits 0-1 its class, then flags, the step that led to it, and the number of the search.
@@ -77,7 +85,10 @@ def mark_of(search, lattice, costs, voxel, x, y, z):
             classify_range(costs, first, last, number << SEARCH_SHIFT, search.mark)
             mark = np.int64(search.mark[voxel])
         else:
-            kind = classify_voxel(lattice, costs, voxel, x, y, z, 0, len(lattice.footprint))
+            if lattice.edge == 1:
+                kind = classify_voxel(lattice, costs, voxel, x, y, z, 0, len(lattice.footprint))
+            else:
+                kind = standing_voxel(lattice, costs, (x, y, z))[0]
             mark = number << SEARCH_SHIFT | kind
             search.mark[voxel] = np.uint32(mark)
     return mark
@@ -106,6 +117,21 @@ def cost_to(search, voxel):
     mark = np.int64(search.mark[voxel])
     reached = mark >> SEARCH_SHIFT == search.searches[0] and mark & STEP != 0
     return search.cost[voxel] if reached else math.inf
+
+
+@inlined_kernel
+def length_to(search, lattice, costs, voxel):
+    """Return the cost, in voxel edges, of the path to a voxel, at indices (x, y, z) of the grid; inf = none.
+
+    It is that of the voxel's cell; where cells are several voxels, there is none to a voxel in which the body
+    does not fit.
+    """
+    cost = cost_to(search, cell_of(lattice, voxel))
+    if lattice.edge == 1 or math.isinf(cost):
+        return cost
+    number, body = flat_index(lattice.grid, voxel[0], voxel[1], voxel[2]), len(lattice.footprint)
+    kind = classify_voxel(lattice, costs, number, voxel[0], voxel[1], voxel[2], 0, body)
+    return math.inf if kind == IMPASSABLE else lattice.edge * cost
 
 
 @inlined_kernel
