@@ -105,7 +105,8 @@ def _fill_far(proposer, situation, state, options):
 def propose_far(proposer, situation, state):
     """Fill `scratch.far` with far viewpoints, evaluated; the nearer half of the world first.
 
-    Paths are searched farther and farther until no place beyond could be worth more. The goal to which the
+    Paths are searched farther and farther until no place beyond could be worth more; between cells of several
+    voxels, which takes little time, everywhere in the second search. The goal to which the
     robot is on its way comes last, if there is one.
 
     Args:
@@ -136,7 +137,7 @@ def propose_far(proposer, situation, state):
         seconds = max(radius * proposer.exact.voxel_size_m / proposer.drive.max_speed_m_s, 1e-9)
         if radius >= everywhere or best >= value_of(situation, experience.most_bits, seconds):
             return count, best
-        radius *= 2.0
+        radius = 2.0 * radius if proposer.lattice.edge == 1 else everywhere
 
 
 @lean_kernel

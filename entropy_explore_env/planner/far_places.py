@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.fields import remaining_bits
-from entropy_explore_env.belief.paths.lattice import Costs, Lattice
-from entropy_explore_env.belief.paths.search import Search, length_to
+from entropy_explore_env.belief.paths.lattice import Costs, Lattice, cell_of, standing_voxel
+from entropy_explore_env.belief.paths.search import Search, cost_to
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
@@ -149,6 +149,9 @@ def fill_blocks(belief, count, start, radius, blocks):
 def place_of(paths, blocks, i, j, k):
     """Return the voxel from which a block is looked at: see the top of this file; NOT_REACHED = none.
 
+    Where paths are searched in cells of several voxels, it is the voxel of the place's cell in which the body
+    stands.
+
     Args:
         paths: FoundPaths from the robot.
         blocks: Blocks, filled in; this one is in the window.
@@ -170,9 +173,14 @@ def place_of(paths, blocks, i, j, k):
                 voxel = flat_index(size, x, y, z)
                 if away >= nearest or not blocks.free[voxel] or (layer >= 0 and z != layer):
                     continue
-                if length_to(paths.search, paths.lattice, paths.costs, (x, y, z)) < math.inf:
+                if cost_to(paths.search, cell_of(paths.lattice, (x, y, z))) < math.inf:
                     nearest, place = away, voxel
-    return place
+    if place == NOT_REACHED or paths.lattice.edge == 1:
+        return place
+    edge, (x, y, z) = paths.lattice.edge, grid_index(size, place)
+    x, y, z = standing_voxel(paths.lattice, paths.costs, (x // edge, y // edge, z // edge))[1]
+    place = flat_index(size, x, y, z)
+    return place if blocks.free[place] else NOT_REACHED
 
 
 @lean_kernel
