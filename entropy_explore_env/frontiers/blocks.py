@@ -36,7 +36,9 @@ ROOM = 16
 """A robot may scan from here, and has not yet."""
 COUNTED_FREE = 32
 """Mapped and free, and counted as such in `Blocks.free`."""
-_ALL_FLAGS = 63
+COUNTED_EDGE = 64
+"""An EDGE that is not DROPPED, and counted as such in `Blocks.met`."""
+_ALL_FLAGS = 127
 NONE = -1
 """In place of the number of a cell or voxel: there is none."""
 _NO_COSTS = np.zeros(0)
@@ -124,10 +126,12 @@ class Blocks(NamedTuple):
     state: np.ndarray
     """(N,) uint8: UNEXPLORED, UNMAPPED, COVERED; kept up to date by others."""
     flags: np.ndarray
-    """(N,) uint8: EDGE, CANDIDATE, EXCLUDED, DROPPED, ROOM, COUNTED_FREE."""
+    """(N,) uint8: EDGE, CANDIDATE, EXCLUDED, DROPPED, ROOM, COUNTED_FREE, COUNTED_EDGE."""
     free: np.ndarray
     """(N,) uint16 or uint32, how many of the cells that a body in each cell touches are mapped and free; kept
     up to date by others. (0,) in plans and layers, where footprints are small enough to be looked through."""
+    met: np.ndarray
+    """(N,), or (0,), as `free`: how many of these cells are an EDGE that is not DROPPED."""
     candidate: np.ndarray
     """(B,) int32, cell; NONE = no cell of the block is a CANDIDATE."""
     edges: np.ndarray
@@ -142,6 +146,8 @@ class Blocks(NamedTuple):
     """Blocks along each axis."""
     footprint: np.ndarray
     """(F, 3) int64 index offsets of the cells that a body touches; its own first."""
+    columns: np.ndarray
+    """(C, 4) int64, the footprint as columns: offsets along x and y, lowest and highest offset along z."""
     reach: int
     """Largest of these offsets."""
     layer: int
@@ -155,11 +161,12 @@ def new_blocks(
     flat = shape[2] == 1 or layer is not None
     across = (spacing, spacing, int(shape[2]) if flat else spacing)
     blocks = [math.ceil(n / width) for n, width in zip(shape, across, strict=True)]
-    counted = 0 if flat else len(state)
+    counted, count_type = 0 if flat else len(state), np.uint16 if len(footprint) < 1 << 16 else np.uint32
     return Blocks(
         state=state,
         flags=np.zeros(len(state), np.uint8),
-        free=np.zeros(counted, np.uint16 if len(footprint) < 1 << 16 else np.uint32),
+        free=np.zeros(counted, count_type),
+        met=np.zeros(counted, count_type),
         candidate=np.full(math.prod(blocks), NONE, np.int32),
         edges=np.zeros(math.prod(blocks), np.uint8),
         dirty=np.zeros(math.prod(blocks), np.uint8),
@@ -167,9 +174,19 @@ def new_blocks(
         across=across,
         blocks=(blocks[0], blocks[1], blocks[2]),
         footprint=footprint,
+        columns=_columns(footprint),
         reach=int(np.abs(footprint).max(initial=0)),
         layer=-1 if layer is None else int(layer),
     )
+
+
+def _columns(footprint: np.ndarray) -> np.ndarray:
+    """Return (C, 4) int64 columns of a footprint, none of which has a gap: see `Blocks`."""
+    across, column = np.unique(footprint[:, :2], axis=0, return_inverse=True)
+    low, high = np.zeros(len(across), np.int64), np.zeros(len(across), np.int64)
+    np.minimum.at(low, column.reshape(-1), footprint[:, 2])
+    np.maximum.at(high, column.reshape(-1), footprint[:, 2])
+    return np.column_stack([across, low, high])
 
 
 @inlined_kernel
@@ -244,6 +261,31 @@ def set_flag(blocks, cell, flag, value):
 
 
 @lean_kernel
+def count_for_bodies(blocks, counts, cell, flag, counted):
+    """Count a cell, or no longer, in all cells from which a body touches it.
+
+    Args:
+        blocks: Its flags are changed.
+        counts: (N,), changed.
+        cell: Its number.
+        flag: Set while the cell is counted.
+        counted: Whether it counts now.
+    """
+    if counted == (blocks.flags[cell] & flag > 0):
+        return
+    set_flag(blocks, cell, flag, counted)
+    change, size = 1 if counted else -1, blocks.size
+    x, y, z = grid_index(size, cell)
+    for column in blocks.columns:
+        i, j = x - column[0], y - column[1]
+        if 0 <= i < size[0] and 0 <= j < size[1]:
+            first, last = max(z - column[3], 0), min(z - column[2], size[2] - 1)
+            near = flat_index(size, i, j, first)
+            for at in range(near, near + last - first + 1):
+                counts[at] += change
+
+
+@lean_kernel
 def mark_edges(blocks):
     """Set EDGE in the blocks that have to be updated."""
     state = blocks.state
@@ -263,6 +305,9 @@ def mark_edges(blocks):
                     set_flag(blocks, cell, EDGE, edge)
                     if edge:
                         blocks.edges[block] = 1
+                    if len(blocks.met) > 0:
+                        counts = edge and blocks.flags[cell] & DROPPED == 0
+                        count_for_bodies(blocks, blocks.met, cell, COUNTED_EDGE, counts)
 
 
 @lean_kernel
@@ -296,6 +341,8 @@ def _edges_near(blocks, low, high):
 @inlined_kernel
 def _meets_edge(blocks, x, y, z):
     """Return whether the footprint in a cell meets the edge."""
+    if len(blocks.met) > 0:
+        return blocks.met[flat_index(blocks.size, x, y, z)] > 0
     for offset in blocks.footprint:
         near = cell_at(blocks.size, x + offset[0], y + offset[1], z + offset[2])
         if near != NONE and blocks.flags[near] & (EDGE | DROPPED) == EDGE:

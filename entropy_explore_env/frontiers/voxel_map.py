@@ -29,6 +29,7 @@ from entropy_explore_env.frontiers.blocks import (
     block_span,
     cell_at,
     choose_candidate,
+    count_for_bodies,
     mark_around,
     mark_edges,
     set_flag,
@@ -62,23 +63,10 @@ def update_voxels(states, blocks, cost, mean, precision, levels):
             if blocks.layer < 0 or abs(z - blocks.layer) <= blocks.reach + 2:
                 mark_around(blocks, voxel, blocks.reach + 2)
             if len(blocks.free) > 0:
-                _count_free(blocks, voxel)
+                free = blocks.state[voxel] & (UNMAPPED | COVERED) == 0
+                count_for_bodies(blocks, blocks.free, voxel, COUNTED_FREE, free)
     update_blocks(blocks, cost)
     return changed
-
-
-@lean_kernel
-def _count_free(blocks, voxel):
-    """Count a voxel that has become free, or is no longer, for all voxels from which a body touches it."""
-    free = blocks.state[voxel] & (UNMAPPED | COVERED) == 0
-    if free == (blocks.flags[voxel] & COUNTED_FREE > 0):
-        return
-    set_flag(blocks, voxel, COUNTED_FREE, free)
-    x, y, z = grid_index(blocks.size, voxel)
-    for offset in blocks.footprint:
-        near = cell_at(blocks.size, x - offset[0], y - offset[1], z - offset[2])
-        if near != NONE:
-            blocks.free[near] += 1 if free else -1
 
 
 @lean_kernel
