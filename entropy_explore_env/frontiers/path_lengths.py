@@ -13,14 +13,16 @@ import numpy as np
 from entropy_explore_env.belief.paths.lattice import Costs, Lattice, costs_of, new_lattice
 from entropy_explore_env.belief.paths.layer_lengths import fill_layer_lengths
 from entropy_explore_env.belief.paths.planning import resume_search, search_paths, start_search
-from entropy_explore_env.belief.paths.search import Search, cost_to, extract_path
+from entropy_explore_env.belief.paths.search import Search, extract_path, length_to
 from entropy_explore_env.belief.paths.string_pulling import line_of_sight_cost, string_pulled
+from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.frontiers.voxel_map import voxels_around
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.viewpoints.evaluation import cell_edge
 
 _ROOM, _ROOM_DRAWS = 40, 64
 """Voxels along each axis within which places are drawn that make room for others, and how many are drawn."""
@@ -34,31 +36,42 @@ _FARTHER = 1.3
 class KnownPaths:
     """Shortest paths through the known free space of one robot's map.
 
+    Lengths are those of paths between cells of several voxels where `cell_edge` says so, in voxel edges; what
+    a robot drives along is found voxel by voxel.
+
     Attributes:
         search: Memory of the searches; one at a time, so that robots can share it.
+        lattice: Steps between voxels.
         reach: How far the latest search of `start` goes: lengths up to this are final.
     """
 
     def __init__(self, scenario: Scenario, kind: RobotKind, cells: VoxelFrontiers, search: Search) -> None:
         """Search paths in the map of `cells`, which may change between searches."""
         self._cells, self.search, self._grid = cells, search, scenario.grid
-        self.lattice = new_lattice(scenario.grid.shape, 0.0, scenario.layer_of(kind.robot))
+        shape, layer, edge = scenario.grid.shape, scenario.layer_of(kind.robot), cell_edge(scenario, kind)
+        self.lattice = new_lattice(shape, 0.0, layer)
+        self._coarse = self.lattice if edge == 1 else new_lattice(shape, 0.0, layer, edge)
         self.costs = costs_of(cells.traversal_cost, 1.0)
-        self.reach = 0.0
+        self.reach, self._start = 0.0, NONE
 
     def start(self, voxel: int) -> None:
         """Begin a search from a voxel in which a robot stands, whether or not its body is known to fit."""
         opened = self._cells.open_start(voxel)
-        start_search(self.search, self.lattice, self.costs, np.array([voxel], np.int32))
-        self.reach = max(_FIRST_REACH, 4.0 * self._cells.body_reach)
-        resume_search(self.search, self.lattice, self.costs, self.reach)
+        self._start, indices = voxel, np.unravel_index(voxel, self._grid.shape)
+        source = np.ravel_multi_index([n // self._coarse.edge for n in indices], self._coarse.size)
+        start_search(self.search, self._coarse, self.costs, np.array([source], np.int32))
+        self._search_within(max(_FIRST_REACH, 4.0 * self._cells.body_reach))
         self._cells.close(opened)
+
+    def _search_within(self, reach: float) -> None:
+        """Continue the search of `start` until all lengths up to `reach` are final."""
+        resume_search(self.search, self._coarse, self.costs, reach / self._coarse.edge)
+        self.reach = reach
 
     def extend(self, reach: float) -> None:
         """Continue the search of `start` until all lengths up to `reach` are final; inf = all."""
         if reach > self.reach:
-            resume_search(self.search, self.lattice, self.costs, reach)
-            self.reach = reach
+            self._search_within(reach)
 
     def exhausted(self) -> bool:
         """Return whether the search has found all that can be reached."""
@@ -80,7 +93,7 @@ class KnownPaths:
     def lengths_to(self, voxels: np.ndarray) -> np.ndarray:
         """Return (K,) lengths to (K,) int32 voxels by the latest search, inf where it has not come."""
         lengths = np.empty(len(voxels))
-        fill_lengths(self.search, voxels, lengths)
+        fill_lengths(self.search, self._coarse, self.costs, voxels, lengths)
         return lengths
 
     def all_frontiers(self, here: int) -> tuple[np.ndarray, np.ndarray]:
@@ -191,7 +204,11 @@ class KnownPaths:
         return seen
 
     def route_to(self, goal: int) -> np.ndarray:
-        """Return (N,) int32 voxels of the path to a voxel by the latest search, from where it began."""
+        """Return (N,) int32 voxels of the path to a voxel from where the latest search of `start` began."""
+        return self._path_found(goal) if self._coarse.edge == 1 else self.path_to(self._start, goal)
+
+    def _path_found(self, goal: int) -> np.ndarray:
+        """Return (N,) int32 voxels of the path to a voxel by the latest search from voxel to voxel."""
         path = np.empty(extract_path(self.search, self.lattice, goal, np.empty(0, np.int32)), np.int32)
         extract_path(self.search, self.lattice, goal, path)
         return path
@@ -201,7 +218,7 @@ class KnownPaths:
         opened = self._cells.open_start(start)
         search_paths(self.search, self.lattice, self.costs, np.array([start], np.int32), goal, math.inf)
         self._cells.close(opened)
-        return self.route_to(goal)
+        return self._path_found(goal)
 
     def corners_of(self, path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
         """Return (M, 3) points, grid units, where the latest path, pulled straight, turns; the goal last."""
@@ -209,10 +226,13 @@ class KnownPaths:
 
 
 @lean_kernel
-def fill_lengths(search: Search, voxels: np.ndarray, lengths: np.ndarray) -> None:
+def fill_lengths(
+    search: Search, lattice: Lattice, costs: Costs, voxels: np.ndarray, lengths: np.ndarray
+) -> None:
     """Fill (K,) float64 with the lengths of paths to (K,) int32 voxels by the latest search."""
     for place in range(len(voxels)):
-        lengths[place] = cost_to(search, voxels[place])
+        voxel = grid_index(lattice.grid, np.int64(voxels[place]))
+        lengths[place] = length_to(search, lattice, costs, voxel)
 
 
 @lean_kernel

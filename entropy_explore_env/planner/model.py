@@ -13,17 +13,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.fields import Belief
-from entropy_explore_env.belief.paths.lattice import Costs, Lattice, longest_edge, new_lattice
+from entropy_explore_env.belief.paths.lattice import Costs, Lattice, new_lattice
 from entropy_explore_env.belief.paths.search import Search, new_search
 from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.planner.far_places import Blocks, new_blocks
 from entropy_explore_env.planner.recipe import Recipe, angular_spread, recipe_for
 from entropy_explore_env.planner.records import KNOWLEDGE, MATE, OPTION, VIEW
-from entropy_explore_env.planner.thresholds import CELLS_WITHIN, REFINED_AROUND
+from entropy_explore_env.planner.thresholds import REFINED_AROUND
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
-from entropy_explore_env.viewpoints.evaluation import DriveModel, robot_model, sees_all_around
+from entropy_explore_env.viewpoints.evaluation import (
+    DriveModel,
+    cell_edge,
+    places_within,
+    robot_model,
+    sees_all_around,
+)
 from entropy_explore_env.viewpoints.expected_scan import ScanModel, ScanScratch, new_scan_scratch
 
 _WAYPOINTS = 64
@@ -154,16 +160,6 @@ def new_proposers(scenario: Scenario, recipe: Recipe | None = None) -> list[Prop
     return [_proposer(scenario, kind, of_kind, scratch) for kind, of_kind in pairs]
 
 
-def _cell_edge(within: float, body_radius: float) -> int:
-    """Return the edge of the cells in which a flying robot searches paths.
-
-    Args:
-        within: Largest distance at which places are drawn, in voxel edges.
-        body_radius: Radius of the body, in voxel edges; the larger it is, the longer edges may be.
-    """
-    return max(1, min(longest_edge(body_radius), int(within / CELLS_WITHIN)))
-
-
 def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: ProposalScratch) -> Proposer:
     grid, robot, sensor = scenario.grid, kind.robot, kind.sensor
     drawn, exact = (
@@ -172,9 +168,8 @@ def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: Prop
     )
     planar, reach = scenario.layer_of(robot) is not None, robot.reach_m / grid.voxel_size_m
     width, height = sensor.field_of_view_rad
-    within = float(min(reach, 0.25 * max(grid.shape)))
-    edge = 1 if planar or robot.navigator != "planned" else _cell_edge(within, exact.drive.body_radius)
-    lattice = new_lattice(grid.shape, exact.drive.body_radius, scenario.layer_of(robot), edge)
+    edge, layer = cell_edge(scenario, kind), scenario.layer_of(robot)
+    lattice = exact.lattice if edge == 1 else new_lattice(grid.shape, exact.drive.body_radius, layer, edge)
     return Proposer(
         recipe=recipe,
         drawn=drawn.scan,
@@ -186,7 +181,7 @@ def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: Prop
         planned=robot.navigator == "planned",
         all_around=bool(sees_all_around(sensor)),
         axes=2 if planar else 3,
-        within=within,
+        within=places_within(grid, robot.reach_m),
         reach=float(min(reach, sum(grid.shape))),
         view_rad=(float(width), float(height)),
         view_width_rad=float(max(width, height, sensor.angular_step_rad)),

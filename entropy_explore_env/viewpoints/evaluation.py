@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, Lattice, new_lattice
+from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, Lattice, longest_edge, new_lattice
 from entropy_explore_env.belief.raycast import (
     NONE_BEHIND,
     OPEN,
@@ -35,6 +35,10 @@ from entropy_explore_env.viewpoints.expected_scan import ScanModel, ScanScratch,
 
 STRAIGHTENED = 0.96
 """Length of a path after string pulling, as a share of the sum of its steps."""
+
+
+_CELLS_WITHIN = 20
+"""Number of cells within reach from which on paths are searched in cells of several voxels."""
 
 
 class DriveModel(NamedTuple):
@@ -62,6 +66,24 @@ class RobotModel(NamedTuple):
 def sees_all_around(sensor: RangeSensor) -> bool:
     """Return whether a sensor's rays leave no gap around it, so that its yaw does not matter."""
     return sensor.field_of_view_rad[0] > 2.0 * math.pi - 1.5 * sensor.angular_step_rad
+
+
+def places_within(grid: Grid, reach_m: float) -> float:
+    """Return the largest distance, in voxel edges, at which places are compared for one drive."""
+    return float(min(reach_m / grid.voxel_size_m, 0.25 * max(grid.shape)))
+
+
+def cell_edge(scenario: Scenario, kind: RobotKind) -> int:
+    """Return the edge, in voxels, of the cells in which paths to viewpoints are searched.
+
+    It is 1 but for robots that fly and plan in grids whose voxels are small for their reach: the larger the
+    body is, the longer edges may be.
+    """
+    grid, robot = scenario.grid, kind.robot
+    if scenario.layer_of(robot) is not None or robot.navigator != "planned":
+        return 1
+    cells = int(places_within(grid, robot.reach_m) / _CELLS_WITHIN)
+    return max(1, min(longest_edge(robot.planning_radius_m / grid.voxel_size_m), cells))
 
 
 def robot_model(

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given
 
+from entropy_explore_env.belief.paths.search import new_search
+from entropy_explore_env.frontiers.path_lengths import KnownPaths
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import OFFICE_3D
+from entropy_explore_env.viewpoints import evaluation
 from tests.planner.scenes import corridor, random_plan, scene_of
 from tests.reference import explorers as reference
 from tests.reference.scenes import drawn, seeds
@@ -33,3 +42,57 @@ def test_lengths_between_places_are_the_shortest(seed):
     wanted = np.array([[field[place] for place in (robot, *places)] for field in fields])
     found = scene.paths.lengths_between(voxels, scene.paths.lengths_from(scene.here, voxels))
     assert found == pytest.approx(wanted, rel=1e-5, abs=1e-5)
+
+
+DRONE = with_settings(
+    OFFICE_3D,
+    {"grid": Grid((60, 42, 14), 0.1), "robots": 1, "robot": {"body_radius_m": 0.3, "reach_m": 3.0}},
+)
+
+
+def known_hall(seed):
+    """A hall that a drone knows, but for patches, with pillars and a wall with a door, and where it is."""
+    rng, shape = np.random.default_rng(seed), DRONE.grid.shape
+    mean, precision = np.full(shape, 0.05, np.float32), np.full(shape, 100.0, np.float32)
+    mean[30, :30], mean[30, 39:] = 0.95, 0.95
+    for _ in range(4):
+        x, y = int(rng.integers(10, 56)), int(rng.integers(10, 38))
+        mean[x : x + 2, y : y + 2] = 0.95
+    x, y = int(rng.integers(34, 56)), int(rng.integers(4, 38))
+    precision[x : x + 4, y : y + 4] = 30.0**-2
+    cells = VoxelFrontiers(DRONE, DRONE.kind_of(0))
+    view = SimpleNamespace(
+        mean=mean, precision=precision, scenario=DRONE, teammates={}, robot=0, since_scan_m=0.0
+    )
+    cells.update(view, 0.5)  # type: ignore[arg-type]
+    return cells, int(np.ravel_multi_index((5, 5, 6), shape))
+
+
+@given(seeds)
+@drawn(10)
+def test_drones_in_fine_grids_find_about_the_same_lengths_in_cells(seed):
+    """To standing places, by cells of 0.3 m and by voxels of 0.1 m; routes lead from voxel to voxel."""
+    cells, here = known_hall(seed)
+    fine = KnownPaths(DRONE, DRONE.kind_of(0), cells, new_search(DRONE.grid.voxels))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(evaluation, "_CELLS_WITHIN", 5)
+        assert (evaluation.cell_edge(DRONE, DRONE.kind_of(0)), fine.lattice.edge) == (3, 1)
+        coarse = KnownPaths(DRONE, DRONE.kind_of(0), cells, new_search(DRONE.grid.voxels))
+    standing = np.flatnonzero(np.isfinite(cells.traversal_cost)).astype(np.int32)
+    others = np.random.default_rng(seed).choice(standing, 40)
+    by_voxels, by_cells = fine.lengths_from(here, others), coarse.lengths_from(here, others)
+    assert np.isfinite(by_voxels).sum() > 5
+    np.testing.assert_array_equal(np.isfinite(by_cells[np.isfinite(by_voxels)]), True)
+    near = by_voxels[np.isfinite(by_voxels)]
+    assert (np.abs(by_cells[np.isfinite(by_voxels)] - near) <= 0.1 * near + 2 * 3 * np.sqrt(3.0)).all()
+    goal = int(others[np.isfinite(by_voxels)][np.argmax(near)])
+    fine.start(here)
+    fine.extend(np.inf)
+    route, steps = fine.route_to(goal), coarse.route_to(goal)
+    assert (steps[0], steps[-1]) == (route[0], route[-1]) == (here, goal)
+    for path in (route, steps):
+        places = np.stack(np.unravel_index(path, DRONE.grid.shape), axis=-1)
+        assert np.abs(np.diff(places, axis=0)).max() == 1
+        assert np.linalg.norm(np.diff(places, axis=0), axis=1).sum() == pytest.approx(near.max(), rel=1e-6)
+    walled = np.random.default_rng(seed).choice(np.flatnonzero(np.isinf(cells.traversal_cost)), 20)
+    assert np.isinf(coarse.lengths_from(here, walled.astype(np.int32))).all()

@@ -238,7 +238,7 @@ def drone_in_a_hall():
 
 
 def test_drones_in_fine_grids_search_paths_in_cells_and_stop_where_they_fit(monkeypatch):
-    monkeypatch.setattr("entropy_explore_env.planner.model.CELLS_WITHIN", 8)
+    monkeypatch.setattr("entropy_explore_env.viewpoints.evaluation._CELLS_WITHIN", 8)
     hall, situation = drone_in_a_hall()
     proposer = new_proposers(hall)[0]
     assert proposer.lattice.edge == 3 and proposer.lattice.grid == hall.grid.shape

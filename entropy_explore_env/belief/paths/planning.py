@@ -165,7 +165,7 @@ def _relax_neighbours(search, lattice, costs, voxel, at, neighbours, query, max_
         The largest cost that is still of interest: less than `max_cost` if the goal was reached.
     """
     marks, cost, number = search.mark, search.cost, search.searches[0]
-    here, per_edge = cost[voxel], cost_per_edge(costs, voxel, np.int64(marks[voxel]))
+    here, per_edge = cost[voxel], cost_per_edge(lattice, costs, voxel, np.int64(marks[voxel]))
     passable, settled = neighbours
     left = passable
     if query.goal == ANY_GOAL:
@@ -178,7 +178,7 @@ def _relax_neighbours(search, lattice, costs, voxel, at, neighbours, query, max_
             continue
         near = voxel + move.offset
         mark = np.int64(marks[near])
-        there = here + 0.5 * move.length * (per_edge + cost_per_edge(costs, near, mark))
+        there = here + 0.5 * move.length * (per_edge + cost_per_edge(lattice, costs, near, mark))
         before = math.inf
         if mark & STEP:
             before = cost[near]

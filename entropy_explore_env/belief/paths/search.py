@@ -101,12 +101,15 @@ def is_passable(mark):
 
 
 @inlined_kernel
-def cost_per_edge(costs, voxel, mark):
-    """Return the traversal cost of a voxel by its mark; that of an impassable start is the lower bound."""
+def cost_per_edge(lattice, costs, voxel, mark):
+    """Return the traversal cost of a voxel by its mark; that of an impassable start is the lower bound.
+
+    Where cells are several voxels, a field of costs says no more than what is passable.
+    """
     kind = mark & KIND
     if kind == IMPASSABLE:
         return costs.min_per_edge
-    if len(costs.per_edge) > 0:
+    if len(costs.per_edge) > 0 and lattice.edge == 1:
         return np.float64(costs.per_edge[voxel])
     return costs.unknown_cost if kind == UNKNOWN else 1.0
 

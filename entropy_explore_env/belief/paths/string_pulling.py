@@ -90,7 +90,7 @@ def line_of_sight_cost(search, lattice, costs, start, finish):
         (finish[0] - start[0]) ** 2 + (finish[1] - start[1]) ** 2 + (finish[2] - start[2]) ** 2
     )
     voxel = flat_index(size, x, y, z)
-    per_edge = cost_per_edge(costs, voxel, mark_of(search, lattice, costs, voxel, x, y, z))
+    per_edge = cost_per_edge(lattice, costs, voxel, mark_of(search, lattice, costs, voxel, x, y, z))
     share, total = 0.0, 0.0
     while True:
         share_x = _share(x, step_x, start[0], finish[0])
@@ -117,7 +117,7 @@ def line_of_sight_cost(search, lattice, costs, start, finish):
                 mark = mark_of(search, lattice, costs, voxel, i, j, k)
                 if not is_passable(mark):
                     return math.inf
-                per_edge = cost_per_edge(costs, voxel, mark)
+                per_edge = cost_per_edge(lattice, costs, voxel, mark)
         x += step_x if crossed & 1 else 0
         y += step_y if crossed & 2 else 0
         z += step_z if crossed & 4 else 0
@@ -150,12 +150,12 @@ def _cost_along(search, lattice, costs, path, number):
     voxels, start, finish = path.voxels, path.start, path.finish
     first = _stop(lattice, path, _FIRST)
     mark = np.int64(search.mark[voxels[0]])
-    cost = _distance((start[0], start[1], start[2]), first) * cost_per_edge(costs, voxels[0], mark)
+    cost = _distance((start[0], start[1], start[2]), first) * cost_per_edge(lattice, costs, voxels[0], mark)
     cost += cost_to(search, voxels[min(number, path.count) - 1]) - cost_to(search, voxels[0])
     if number > path.count:
         last, end = _stop(lattice, path, path.count), voxels[path.count - 1]
         mark = np.int64(search.mark[end])
-        cost += _distance(last, (finish[0], finish[1], finish[2])) * cost_per_edge(costs, end, mark)
+        cost += _distance(last, (finish[0], finish[1], finish[2])) * cost_per_edge(lattice, costs, end, mark)
     return cost
 
 
