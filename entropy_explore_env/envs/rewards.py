@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.missions.poses import driven_metres
 from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.simulation import Missions
 
@@ -87,7 +86,7 @@ class StepRewards:
             return None
         robots, clocks = missions.state.robots, missions.state.missions
         return _Counters(
-            _driven_m(missions),
+            robots["distance_m"].copy(),
             robots["bits_sent"].astype(np.float64),
             clocks["time_s"].copy(),
             clocks["end"] == _RUNNING,
@@ -139,13 +138,6 @@ class StepRewards:
         return StepRewards, (self.function,)
 
 
-def _driven_m(missions: Missions) -> np.ndarray:
-    """Return (E, A) float64 metres that robots have driven up to now."""
-    driven_m = np.empty(missions.state.robots.shape)
-    driven_metres(missions.rules.params, missions.state.missions, missions.state.robots, driven_m)
-    return driven_m
-
-
 def _figures(missions: Missions, before: _Counters) -> StepFigures:
     """Return the figures of the step since `before`."""
     robots, clocks = missions.state.robots, missions.state.missions
@@ -155,7 +147,7 @@ def _figures(missions: Missions, before: _Counters) -> StepFigures:
         gained_bits=np.where(ran, robots["own_bits"], 0.0),
         received_bits=np.where(ran, robots["received_bits"], 0.0),
         elapsed_s=(clocks["time_s"] - before.time_s)[:, None] * team,
-        distance_m=_driven_m(missions) - before.distance_m,
+        distance_m=robots["distance_m"] - before.distance_m,
         bits_sent=robots["bits_sent"] - before.bits_sent,
         ended=(ran & (clocks["end"] != _RUNNING)[:, None]) & (team > 0.0),
     )

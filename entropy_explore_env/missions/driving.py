@@ -22,7 +22,6 @@ from entropy_explore_env.missions.poses import (
     grid_size,
     path_point,
     place_at,
-    place_with_left,
     pose_at,
     profile_of,
     share_left,
@@ -84,7 +83,6 @@ def start_drive(team, collision, choice, index, time_s, work):
     if code != _ARRIVED and code != _CORNERS:
         robot.blocked_moves += 1
     robot.move_end = code
-    robot.distance_m += driven_m
     drive_s = duration_of(SpeedProfile(driven_m, robot.lead_s, own.max_speed_m_s, own.acceleration_m_s2))
     turn_s = turning_time(robot.origin[3], robot.origin[4], goal[3], goal[4], own.turn_rate_rad_s)
     robot.ready_s = time_s + max(drive_s, turn_s) + own.scan_time_s
@@ -98,7 +96,7 @@ def leave_path(params, robot, time_s, braking):
     """Give up the rest of a robot's drive, if it is under way, and note how it can come to rest on it.
 
     Args:
-        robot: ROBOT; what was counted for the rest of its drive is taken back, and its speed is noted.
+        robot: ROBOT; its speed is noted, and a blocked end that it does not reach is not counted.
         braking: (W, 3) float64, filled in; see Workspace.
 
     Returns:
@@ -111,17 +109,15 @@ def leave_path(params, robot, time_s, braking):
         robot.lead_s = robot.scan_lead_m = 0.0
         return 0
     braking_m = braking_metres(params, robot, time_s)
-    left = share_left(params, robot, time_s)
-    robot.distance_m -= left * robot.path_m
     if robot.move_end != _ARRIVED and robot.move_end != _CORNERS:
         robot.blocked_moves -= 1
     if not math.isinf(params.scan_every_m):
         robot.scan_lead_m = min(since_scan_m(params, robot, time_s), params.scan_every_m)
+    behind = place_at(params, robot, time_s)[3]
     x, y, z, passed = resting_place(params, robot, time_s, braking_m)
     robot.lead_s = math.sqrt(2.0 * braking_m / params.acceleration_m_s2)
     if braking_m == 0.0:
         return 0
-    behind = place_with_left(robot, left)[3]
     for number in range(behind, passed):
         copy_numbers(robot.path[number], braking[number - behind], 3)
     copy_numbers((x, y, z), braking[passed - behind], 3)
@@ -135,7 +131,7 @@ def take_path(robot, choice, rests, braking):
     Returns:
         How many legs of the path are known to be free.
     """
-    robot.path_m = 0.0
+    robot.path_m, robot.departed_m = 0.0, robot.distance_m
     copy_numbers(choice.pose, robot.origin, 5)
     copy_numbers(choice.viewpoint, robot.goal, 5)
     if choice.brakes:
@@ -232,15 +228,14 @@ def halt(params, robot, time_s, until_s):
     Args:
         until_s: When it decides; inf = never.
     """
-    here, left = pose_at(params, robot, time_s), share_left(params, robot, time_s)
-    if left > 0.0:
-        robot.distance_m -= left * robot.path_m
-        if robot.move_end == _ARRIVED or robot.move_end == _CORNERS:
-            robot.blocked_moves += 1
+    here = pose_at(params, robot, time_s)
+    if share_left(params, robot, time_s) > 0.0 and (robot.move_end == _ARRIVED or robot.move_end == _CORNERS):
+        robot.blocked_moves += 1
     copy_numbers(here, robot.origin, 5)
     copy_numbers(here, robot.goal, 5)
     robot.waypoints = robot.corners = robot.scans_under_way = 0
     robot.path_m = robot.lead_s = robot.scan_lead_m = 0.0
+    robot.departed_m = robot.distance_m
     robot.depart_s, robot.move_end = time_s, _FAILED
     robot.deciding = robot.under_way = robot.path_blocked = False
     robot.waiting = True
@@ -299,7 +294,6 @@ def continue_drive(params, footprint, mean, robot, estimate, time_s, crossing):
 def end_drive(params, robot, passed, time_s):
     """Let a drive end where the robot has just scanned, after `passed` corners; it decides anew."""
     driven_m = robot.scans_under_way * params.scan_every_m
-    robot.distance_m -= robot.path_m - driven_m
     copy_numbers(robot.scan_pose, robot.goal, 5)
     robot.corners, robot.path_m = passed, driven_m
     robot.ready_s, robot.next_scan_s, robot.deciding = time_s, time_s, True

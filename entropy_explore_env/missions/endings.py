@@ -10,7 +10,7 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.faults import all_gone, gone
 from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.rules import Rules
-from entropy_explore_env.missions.scoring import driven_m, holds_enough
+from entropy_explore_env.missions.scoring import holds_enough, planned_m
 from entropy_explore_env.missions.state import MissionState
 
 _RUNNING, _MAPPED = MissionEnd.RUNNING.code, MissionEnd.MAPPED.code
@@ -87,7 +87,7 @@ def exhausted(mission):
     clock, team, drivable = mission.clock, mission.team, mission.joint.drivable
     shared, robots = team.params[0], team.robots
     edges_m = (shared.size[0] + shared.size[1] + shared.size[2]) * shared.voxel_size_m
-    now_m = driven_m(robots)
+    now_m = planned_m(robots)
     scans, rounds_m = IDLE_SCANS * len(robots), IDLE_ROUNDS * edges_m * len(robots)
     if clock.idle_scans < scans and now_m - clock.idle_from_m < rounds_m:
         return False

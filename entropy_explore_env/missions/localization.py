@@ -17,7 +17,7 @@ import numpy as np
 
 from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.missions.poses import copy_numbers, pose_at, share_left
+from entropy_explore_env.missions.poses import copy_numbers, pose_at
 from entropy_explore_env.randomness import Stream, splitmix_states
 from entropy_explore_env.robots.channel import BITS_PER_COVARIANCE
 from entropy_explore_env.robots.localization import (
@@ -172,8 +172,7 @@ def note_motion(localization, params, robot, index, time_s):
         return
     estimate = localization.estimates[index]
     pose = pose_at(params, robot, time_s)
-    driven_m = robot.distance_m - share_left(params, robot, time_s) * robot.path_m
-    advance_estimate(estimate, localization.params[index], point(pose), pose[3], driven_m)
+    advance_estimate(estimate, localization.params[index], point(pose), pose[3], robot.distance_m)
     keep_in_workspace(estimate, params)
 
 

@@ -134,10 +134,8 @@ def pose_at(params, robot, time_s):
 
 
 @lean_kernel
-def driven_metres(params, missions, robots, out):
-    """Fill (E, A): metres that robots have driven up to now; `distance_m` counts a drive when it begins."""
-    for mission in range(robots.shape[0]):
-        time_s = missions[mission].time_s
-        for index in range(robots.shape[1]):
-            own, robot = params[index], robots[mission, index]
-            out[mission, index] = robot.distance_m - share_left(own, robot, time_s) * robot.path_m
+def note_driven(params, robots, time_s):
+    """Carry the distances of a team's robots on to a time as in `pose_at`."""
+    for index in range(len(robots)):
+        own, robot = params[index], robots[index]
+        robot.distance_m = robot.departed_m + (1.0 - share_left(own, robot, time_s)) * robot.path_m

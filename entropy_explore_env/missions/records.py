@@ -117,6 +117,7 @@ ROBOT = ranged_type(
         ("path_end", "i8", Values(0, len(MoveEnd) - 1)),
         ("corners", "i8", Values(0, WAYPOINTS)),  # how many of the points the drive passes before its goal
         ("path_m", "f8", POSITIVE),  # length of the drive
+        ("departed_m", "f8", Values(0.0, MOST)),  # what it had driven when the drive began
         ("depart_s", "f8", PAST),  # start of the drive
         ("lead_s", "f8", SIGNED),  # of its SpeedProfile
         ("scan_lead_m", "f8", POSITIVE),  # metres from its latest scan to the start of the drive
@@ -137,7 +138,7 @@ ROBOT = ranged_type(
         ("sensor_rng", "u8", None, (1,)),  # random state of range noise
         ("channel_rng", "u8", None, (1,)),  # random state of message loss
         # counted from the mission's start
-        ("distance_m", "f8", Values(-1.0, MOST)),
+        ("distance_m", "f8", Values(0.0, MOST)),  # driven up to the mission's time
         ("scans", "i8", COUNT),
         ("measurements", "i8", COUNT),
         ("redundant", "i8", COUNT),  # measurements that brought less than its I_min to its own map

@@ -71,7 +71,7 @@ def scan_and_share(mission, sensor, index, work):
         known = clock.explored_visible
         score_scan(clock, mission.joint, mission.truth, scan, params.prior_precision)
         note_idle(clock, team.robots, clock.explored_visible == known)
-        note_seen(team.params, clock, team.robots)
+        note_seen(clock, team.robots)
     if len(team.robots) > 1 and params.burst > 0:
         share(mission, scan, sensor, index, work.recipients)
 

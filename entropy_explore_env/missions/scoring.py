@@ -11,7 +11,6 @@ import numpy as np
 from entropy_explore_env.belief.map_update import fuse_ray
 from entropy_explore_env.belief.measurement_model import Return
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.missions.poses import share_left
 from entropy_explore_env.missions.records import PROGRESS, SEEN_MARKS
 
 _NOTHING = int(Return.NOTHING)
@@ -33,17 +32,15 @@ def note_progress(clock, robots):
 
 
 @lean_kernel
-def note_seen(params, clock, robots):
+def note_seen(clock, robots):
     """Take time and driven path when the team has seen each of SEEN_MARKS of what can be seen."""
     for mark in range(len(SEEN_MARKS)):
         enough = clock.explored_visible >= SEEN_MARKS[mark] * clock.visible - _ROUNDING
         if enough and clock.seen_s[mark] < 0.0:
             clock.seen_s[mark] = clock.time_s
             clock.seen_m[mark] = 0.0
-            for index in range(len(robots)):
-                robot = robots[index]
-                left_m = share_left(params[index], robot, clock.time_s) * robot.path_m
-                clock.seen_m[mark] += robot.distance_m - left_m
+            for robot in robots:
+                clock.seen_m[mark] += robot.distance_m
 
 
 @lean_kernel
@@ -53,15 +50,15 @@ def note_idle(clock, robots, idle):
         clock.idle_scans += 1
     else:
         clock.idle_scans = 0
-        clock.idle_from_m = driven_m(robots)
+        clock.idle_from_m = planned_m(robots)
 
 
 @lean_kernel
-def driven_m(robots):
-    """Return the metres of the team's drives, those under way taken whole."""
+def planned_m(robots):
+    """Return the metres of the team's drives so far, those under way taken whole."""
     total_m = 0.0
     for robot in robots:
-        total_m += robot.distance_m
+        total_m += robot.departed_m + robot.path_m
     return total_m
 
 

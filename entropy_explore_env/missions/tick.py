@@ -36,6 +36,7 @@ from entropy_explore_env.missions.localization import estimate_of, localization_
 from entropy_explore_env.missions.messages import Maps, Team, Tracer, announce, receive
 from entropy_explore_env.missions.own_maps import summaries_of
 from entropy_explore_env.missions.phases import TeamPhases, broadcast_all, phases_of
+from entropy_explore_env.missions.poses import note_driven
 from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.redecision import decide, note_braking
 from entropy_explore_env.missions.reward import reward_robots
@@ -167,6 +168,7 @@ def advance(mission, sensors, work):
         handled = events_handled(robots, in_flight, mission.phases, team.faults) if ASSERTING else 0
         earlier_s = clock.time_s
         clock.time_s = max(clock.time_s, event.time_s)
+        note_driven(params, robots, clock.time_s)
         if event.kind == MESSAGE_ARRIVES:
             if not receive_summary(team.summaries, team, maps, in_flight, event.number):
                 receive(in_flight, team, maps, event.number, tracer, scan)
@@ -199,6 +201,7 @@ def advance(mission, sensors, work):
         clock.end = mission_end(mission)
     if clock.end == _RUNNING:
         clock.time_s = max(clock.time_s, stop_s)
+        note_driven(params, robots, clock.time_s)
         if stop_s >= shared.time_limit_s:
             clock.end = _TIME_UP
 

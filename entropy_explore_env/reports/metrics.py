@@ -10,7 +10,6 @@ import numpy as np
 
 from entropy_explore_env.missions.faults import fault_counts
 from entropy_explore_env.missions.localization import localization_figures
-from entropy_explore_env.missions.poses import driven_metres
 from entropy_explore_env.missions.records import COUNTED, SEEN_MARKS, MissionEnd
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.robots.range_sensor import (
@@ -159,15 +158,13 @@ def joint_figures(missions: Missions, mission: int) -> dict[str, float | int | N
         seen = clock["seen_s"][place] >= 0.0
         marks[f"t{round(100 * share)}_seen_s"] = float(clock["seen_s"][place]) if seen else None
         marks[f"path{round(100 * share)}_seen_m"] = float(clock["seen_m"][place]) if seen else None
-    one, driven_m = slice(mission, mission + 1), np.empty((1, missions.scenario.robots))
-    driven_metres(missions.rules.params, missions.state.missions[one], missions.state.robots[one], driven_m)
     return {
         "entropy_bits": float(clock["joint_bits"]),
         "explored": int(clock["explored_visible"]) / int(clock["visible"]),
         "error": float(clock["error"]) / explored if explored else None,
         "wrong": int(clock["wrong"]) / explored if explored else None,
         "unseen_free_voxels": int(clock["visible_free"]) - int(clock["explored_free"]),
-        "driven_m": float(driven_m.sum()),
+        "driven_m": float(missions.state.robots[mission]["distance_m"].sum()),
         **marks,
     }
 

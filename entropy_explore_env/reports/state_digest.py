@@ -10,9 +10,6 @@ import numpy as np
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.state import FROM_WORLD
 
-_LATER = "backlog_"
-"""Empty arrays whose names begin so are left out: older records, which lack them, keep their digests."""
-
 
 def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
     """Return the values of a mission's state, but for what follows from its world, by array and field.
@@ -26,7 +23,7 @@ def state_values(missions: Missions, mission: int) -> dict[str, np.ndarray]:
     """
     values: dict[str, np.ndarray] = {}
     for name, array in missions.state._asdict().items():
-        if name in FROM_WORLD or (name.startswith(_LATER) and array.size == 0):
+        if name in FROM_WORLD:
             continue
         if array.dtype.names is None:
             values[name] = array[mission, ...]

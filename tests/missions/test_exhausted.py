@@ -30,7 +30,7 @@ def idle(missions, scans=IDLE_SCANS, rounds=IDLE_ROUNDS):
     """Let the team have been idle for so long that its next step, a turn on the spot, asks what is left."""
     clock, robots = missions.state.missions[0], missions.state.robots[0]
     clock["idle_scans"] = 2 * scans
-    clock["idle_from_m"] = robots["distance_m"].sum() - 2 * rounds * EDGES_M - 1e-6
+    clock["idle_from_m"] = (robots["departed_m"] + robots["path_m"]).sum() - 2 * rounds * EDGES_M - 1e-6
     missions.step(np.zeros((1, 2, 5)), np.zeros((1, 2), np.int64))
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from entropy_explore_env.missions.poses import driven_metres, place_at, pose_at, speed_at, within_grid
+from entropy_explore_env.missions.poses import note_driven, place_at, pose_at, speed_at, within_grid
 from entropy_explore_env.settings.grid import Grid
 from tests.reference.scenes import free_box, started
 
@@ -18,7 +18,7 @@ def around_a_corner():
     own = missions.state.robots[0, 0]
     own["origin"], own["goal"] = (-0.5, 2.5, 1.0, 3.0, 0.0), (1.0, 4.5, 1.0, -3.0, 0.5)
     own["path"][0], own["corners"], own["path_m"] = (-0.5, 4.5, 1.0), 1, 3.5
-    own["depart_s"], own["ready_s"], own["distance_m"] = 10.0, 18.5, 5.0
+    own["depart_s"], own["ready_s"], own["departed_m"] = 10.0, 18.5, 1.5
     return missions, missions.rules.params[0], own
 
 
@@ -38,10 +38,11 @@ def test_a_robot_is_so_far_and_so_fast_on_its_path(time_s, place, corners, speed
     missions, params, own = around_a_corner()
     assert place_at(params, own, time_s) == pytest.approx((*place, 1.0, corners), abs=1e-9)
     assert speed_at(params, own, time_s) == pytest.approx(speed_m_s, abs=1e-9)
-    missions.state.missions["time_s"], driven_m = time_s, np.full((1, 2), 9.0)
-    driven_metres(missions.rules.params, missions.state.missions, missions.state.robots, driven_m)
+    note_driven(missions.rules.params, missions.state.robots[0], time_s)
     on_path_m = max(place[1] - 2.5, 0.0) + place[0] + 0.5
-    assert driven_m[0] == pytest.approx([1.5 + on_path_m, 0.0], abs=1e-9)  # 1.5 m before this drive
+    assert missions.state.robots["distance_m"][0] == pytest.approx(
+        [1.5 + on_path_m, 0.0], abs=1e-9
+    )  # 1.5 m before this drive
 
 
 @pytest.mark.parametrize(

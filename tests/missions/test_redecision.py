@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from entropy_explore_env.missions.poses import driven_metres, pose_at, speed_at
+from entropy_explore_env.missions.poses import pose_at, speed_at
 from entropy_explore_env.missions.redecision import CHOICE, braking_metres, keeps_speed, keeps_target
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.robots.motion import MoveEnd
@@ -67,7 +67,7 @@ def test_a_new_path_begins_at_the_speed_or_where_the_robot_has_braked(
     robot, params = robots[0], missions.rules.params[0]
     assert robot["depart_s"] == before == 2.0
     assert robot["path_m"] == pytest.approx(length_m, abs=1e-6)
-    assert robot["distance_m"] == pytest.approx(0.75 + length_m, abs=1e-6)
+    assert robot["departed_m"] == pytest.approx(0.75, abs=1e-6)
     assert (end_of(robot), robot["blocked_moves"]) == (MoveEnd.ARRIVED, 0)
     for _ in range(20):
         if robots[0]["scans"]:
@@ -97,7 +97,7 @@ def test_a_new_drive_that_something_cuts_short_ends_where_the_robot_can_rest():
     assert robot["path_m"] == pytest.approx(0.25) and robot["goal"][:2] == pytest.approx((0.75, 1.75))
     assert robot["ready_s"] == pytest.approx(3.5)
     robots = toward(missions, (0.75, 2.75, 0.25, 0.0, 0.0))
-    assert (robot["blocked_moves"], robots["distance_m"][0]) == (1, pytest.approx(0.75 + 0.25 + 1.0))
+    assert (robot["blocked_moves"], robots["departed_m"][0]) == (1, pytest.approx(0.75 + 0.25))
 
 
 def test_a_new_drive_that_ends_at_once_leads_around_the_corner_where_the_robot_brakes():
@@ -265,17 +265,15 @@ def test_a_path_that_a_scan_shows_to_be_blocked_is_planned_anew_without_a_stop()
 def test_scans_under_way_are_as_far_apart_whatever_was_decided_between_them():
     """Every ½ m of the way driven: two decisions later, and on the way to rest before it turns back."""
     missions = on_the_way(0.9, sensor={**ALL_ROUND, "scan_every_m": 0.5})
-    robot, params = missions.state.robots[0, 0], missions.rules.params
-    scans_m, robots, ys = [], missions.state.robots, iter((3.75, 2.75, 4.25, 0.75, 0.75, 3.75))
+    robot = missions.state.robots[0, 0]
+    scans_m, ys = [], iter((3.75, 2.75, 4.25, 0.75, 0.75, 3.75))
     for _ in range(40):
         if not robot["under_way"]:
             break
-        before, clock = robot["scans"], missions.state.missions
+        before = robot["scans"]
         toward(missions, (0.75, next(ys, 3.75), 0.25, 0.0, 0.0))
         if robot["scans"] > before:
-            driven_m = np.zeros((1, 1))
-            driven_metres(params, clock, robots, driven_m)
-            scans_m.append((int(robot["scans"]), driven_m[0, 0]))
+            scans_m.append((int(robot["scans"]), float(robot["distance_m"])))
     assert len(scans_m) >= 6
     assert robot["scans"] == math.ceil(robot["distance_m"] / 0.5 - 1e-6)
     for scans, driven_m in scans_m:

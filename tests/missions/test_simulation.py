@@ -13,6 +13,7 @@ from entropy_explore_env.errors import ActionError, CallOrderError, SettingError
 from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.tick import step_missions
+from entropy_explore_env.reports.recording import poses_now
 from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
@@ -243,9 +244,11 @@ class Watch:
             assert (robots[field][~departed] == self.robots[field][~departed]).all()
         longest = robots["ready_s"] - robots["depart_s"]
         assert (longest >= self.missions.scenario.sensor.scan_time_s).all()
-        apart = np.linalg.norm((robots["goal"] - robots["origin"])[:, :3], axis=1)
-        more = robots["distance_m"] - self.robots["distance_m"]
-        assert more == pytest.approx(np.where(departed, apart, 0.0), abs=1e-9)
+        assert (
+            robots["departed_m"] == np.where(departed, self.robots["distance_m"], self.robots["departed_m"])
+        ).all()
+        driven_m = np.linalg.norm(poses_now(self.missions, 0)[:, :3] - robots["origin"][:, :3], axis=1)
+        assert robots["distance_m"] == pytest.approx(robots["departed_m"] + driven_m, abs=1e-9)
         assert (robots["scans"] - self.robots["scans"])[robots["deciding"]].tolist() == [1] * robots[
             "deciding"
         ].sum()

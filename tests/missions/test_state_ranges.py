@@ -32,6 +32,7 @@ SPOILED = {
         "robots.next_scan_s": [math.nan],
         "robots.redecide_s": [math.nan],
         "robots.depart_s": [1e6],
+        "robots.departed_m": [-1.0],
         "robots.messages_received": [-(2**62)],
         "robots.entropy_bits": [math.nan],
         "robots.half_angle_rad": [4.0],

@@ -103,7 +103,7 @@ def test_a_picture_shows_the_first_mission_as_robot_0_knows_it(changes, frames):
         np.testing.assert_array_equal(path[0], starts[robot])
         np.testing.assert_array_equal(path[-1], frame.positions_m[robot])
         driven_m = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
-        assert 0.0 < driven_m <= robots["distance_m"][robot] + 1e-9
+        assert 0.0 < driven_m == pytest.approx(robots["distance_m"][robot])
     assert "box-7x11x5" in frame.title and "robot_0" in frame.title
     said = " ".join(frame.status)
     assert f"time {times[-1]:,.0f} s" in said and f"scans {robots['scans'].sum():,}" in said

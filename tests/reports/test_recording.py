@@ -4,11 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from entropy_explore_env.reports.recording import DrivenPaths, Recorder, poses_now
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.robot_kind import RobotKind
-from tests.reference.scenes import free_box, random_actions, started
+from tests.reference.scenes import drawn, free_box, random_actions, seeds, started
 
 
 def recorded(steps: int, robots: int = 3):
@@ -65,7 +67,7 @@ WANDERERS = {
 @pytest.mark.parametrize("period_s", [None, 0.3, 5.0])
 @pytest.mark.parametrize("kind", WANDERERS)
 def test_paths_are_those_that_were_driven(kind, period_s):
-    """As long as the odometer says whenever a robot stands, through free space only, corners and all."""
+    """As long as the odometer says, under way and at rest, through free space only, corners and all."""
     missions = started(
         free_box(robots=3, decision_period_s=period_s, ending={"sigma_end": 1e-3}, **WANDERERS[kind]), seed=6
     )
@@ -78,11 +80,8 @@ def test_paths_are_those_that_were_driven(kind, period_s):
         drives |= set(enumerate(robots["depart_s"].tolist())) | {(robot, 0.0) for robot in range(3)}
         for robot, path in enumerate(paths.to_now(missions)):
             driven_m = np.linalg.norm(np.diff(path, axis=0), axis=1).sum()
-            if robots["deciding"][robot]:
-                assert driven_m == pytest.approx(robots["distance_m"][robot], abs=1e-9)
-                stood += 1
-            else:
-                assert driven_m <= robots["distance_m"][robot] + 1e-9
+            assert driven_m == pytest.approx(robots["distance_m"][robot], abs=1e-9)
+            stood += bool(robots["deciding"][robot])
     assert stood > 15
     truth = missions.worlds[0].occupied
     for robot, path in enumerate(paths.to_now(missions)):
@@ -91,3 +90,23 @@ def test_paths_are_those_that_were_driven(kind, period_s):
         between = path[:-1] + shares * (path[1:] - path[:-1])
         assert not truth[tuple(np.moveaxis(missions.grid.voxel_of(between), -1, 0))].any()
     assert (sum(map(len, paths.passed_m)) > len(drives)) == (kind == "planned")  # corners
+
+
+@drawn(12)
+@given(seeds, st.sampled_from(["straight", "planned"]), st.sampled_from(["on_scan", 0.45, 0.8]))
+def test_drives_that_are_cut_short_count_as_far_as_they_were_driven(seed, navigator, redecide):
+    """Robots that decide under way brake, turn off, meet each other, and run into what they did not know."""
+    robot = {"navigator": navigator, "reach_m": 3.0, "acceleration_m_s2": 0.7, "redecide": redecide}
+    sensor, ending = {"scan_every_m": 0.4}, {"sigma_end": 1e-3}
+    scenario = free_box(world="furnished", robots=3, robot=robot, sensor=sensor, ending=ending)
+    missions = started(scenario, seed=seed)
+    paths, rng, robots = DrivenPaths(3), np.random.default_rng(seed), missions.state.robots[0]
+    paths.update(missions)
+    for _ in range(40):
+        before_m = robots["distance_m"].copy()
+        missions.step(*random_actions(missions, rng))
+        paths.update(missions)
+        driven_m = [np.linalg.norm(np.diff(path, axis=0), axis=1).sum() for path in paths.to_now(missions)]
+        assert robots["distance_m"] == pytest.approx(driven_m, abs=1e-9)
+        assert (robots["distance_m"] >= before_m - 1e-9).all()
+    assert robots["distance_m"].max() > 0.0

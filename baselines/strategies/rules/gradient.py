@@ -13,6 +13,8 @@ import math
 
 import numpy as np
 
+from entropy_explore_env.belief.raycast import point
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.planner.driver import Driver, Trail
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.robots.motion import MoveEnd
@@ -82,27 +84,46 @@ def steepest(
         projected: Whether gradients and ways are projected on that plane.
     """
     candidates = gradient_candidates(precision, math.inf, position, reach, None)
-    places, slopes, steepness = candidates["place"], candidates["slope"], candidates["steepness"]
-    reachable = np.ones(len(places))
-    if projected:
-        slopes = _on_plane(slopes, *gaze)
-        steepness = np.sqrt((slopes**2).sum(axis=1))
-        way, length = places - position, candidates["distance"]
-        along = np.sqrt((_on_plane(way, *gaze) ** 2).sum(axis=1))
-        np.divide(along, length, out=reachable, where=length > 0.0)
-    uncovered = 1.0 - mean[tuple(places.astype(int).T)].astype(np.float64)
-    scores = reachable * steepness * uncovered
-    if scores.max(initial=0.0) <= 0.0:
+    yaw, pitch = gaze.tolist()
+    ahead = math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), -math.sin(pitch)
+    left = -math.sin(yaw), math.cos(yaw), 0.0
+    best, (x, y, z), steepness = _best(candidates, mean, position, ahead, left, projected)
+    if best < 0:
         return None
-    best = int(np.argmax(scores))
-    x, y, z = slopes[best].tolist()
-    yaw = math.atan2(y, x) if x != 0.0 or y != 0.0 else float(gaze[0])
-    return places[best], (yaw, -math.asin(min(max(z / float(steepness[best]), -1.0), 1.0)))
+    yaw = math.atan2(y, x) if x != 0.0 or y != 0.0 else yaw
+    return candidates[best]["place"], (yaw, -math.asin(min(max(z / steepness, -1.0), 1.0)))
 
 
-def _on_plane(vectors: np.ndarray, yaw: float, pitch: float) -> np.ndarray:
-    """Return the projections (K, 3) on the plane of a gaze and its left (eq. 37)."""
-    ahead = np.array([math.cos(yaw) * math.cos(pitch), math.sin(yaw) * math.cos(pitch), -math.sin(pitch)])
-    left = np.array([-math.sin(yaw), math.cos(yaw), 0.0])
-    along, across = ((vectors * axis).sum(axis=1, keepdims=True) for axis in (ahead, left))
-    return np.asarray(along * ahead + across * left)
+@lean_kernel
+def _best(candidates, mean, position, ahead, left, projected):
+    """Return the number of the best of (K,) CANDIDATE, -1 = none is above zero; then ∇h there and ‖∇h‖."""
+    best, highest, slope, steepness = -1, 0.0, (0.0, 0.0, 0.0), 0.0
+    for number in range(len(candidates)):
+        candidate = candidates[number]
+        place, gradient = point(candidate.place), point(candidate.slope)
+        norm, reachable = candidate.steepness, 1.0
+        if projected:
+            way = place[0] - position[0], place[1] - position[1], place[2] - position[2]
+            gradient, along = _on_plane(gradient, ahead, left), _on_plane(way, ahead, left)
+            norm = math.sqrt(_dot(gradient, gradient))
+            if candidate.distance > 0.0:
+                reachable = math.sqrt(_dot(along, along)) / candidate.distance
+        uncovered = np.float32(1.0) - mean[int(place[0]), int(place[1]), int(place[2])]
+        score = reachable * norm * np.float64(uncovered)
+        if score > highest:
+            best, highest, slope, steepness = number, score, gradient, norm
+    return best, slope, steepness
+
+
+@inlined_kernel
+def _on_plane(vector, ahead, left):
+    """Return the projection (x, y, z) on the plane of a gaze and its left (eq. 37)."""
+    along, across = _dot(vector, ahead), _dot(vector, left)
+    x, y = along * ahead[0] + across * left[0], along * ahead[1] + across * left[1]
+    return x, y, along * ahead[2] + across * left[2]
+
+
+@inlined_kernel
+def _dot(a, b):
+    """Return the scalar product of two vectors (x, y, z)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
