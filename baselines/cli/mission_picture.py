@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from baselines.cli.figures import COLOURS, DOTS_PER_INCH, STYLE, packed_png, png
+from baselines.experiments.plots import COLOURS, DOTS_PER_INCH, STYLE, packed_png, png
 from entropy_explore_env.errors import counted
 from entropy_explore_env.reports.recording import Recorder
 from entropy_explore_env.reports.rendering import Frame, draw_frame, layout_of

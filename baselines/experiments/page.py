@@ -19,7 +19,7 @@ import jinja2
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from baselines.cli.figures import STYLE, png
+from baselines.experiments.plots import STYLE, png
 from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.writing import write_atomically
 

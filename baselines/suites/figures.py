@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from baselines.cli.figures import COLOURS
+from baselines.experiments.plots import COLOURS
 from baselines.suites.faults import CONDITIONS, LOSSES, LOST_ISOLATED, NOTHING_FAILS, Times
 from baselines.suites.results import Results
 

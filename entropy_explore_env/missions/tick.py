@@ -39,7 +39,6 @@ from entropy_explore_env.missions.phases import TeamPhases, broadcast_all, phase
 from entropy_explore_env.missions.poses import note_driven
 from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.redecision import decide, note_braking
-from entropy_explore_env.missions.reward import reward_robots
 from entropy_explore_env.missions.scanning import scan_and_share
 from entropy_explore_env.missions.scoring import note_progress
 from entropy_explore_env.missions.state import Beliefs, JointMap, LatestScans
@@ -149,6 +148,27 @@ def finish_step(team, clock, before_s):
     cost = shared.cost_per_s * (clock.time_s - before_s)
     bits_to_gain = clock.entropy_start_bits - clock.entropy_end_bits
     reward_robots(team.robots, bits_to_gain, shared.team_reward, cost)
+
+
+@lean_kernel
+def reward_robots(robots, bits_to_gain, team, cost):
+    """Reward robots for the bits that they gained in a step, as shares of all that the mission asks for.
+
+        individual: own / (H(0) - H_th) - cost
+        team:       mean over robots of (own + received) / (H(0) - H_th) - cost
+
+    Args:
+        robots: (A,) ROBOT with `own_bits` and `received_bits` of the step; `reward` is filled in.
+        bits_to_gain: H(0) - H_th.
+        team: Which of the two.
+        cost: Of the time that the step took, in shares.
+    """
+    shared = 0.0
+    for robot in robots:
+        shared += (robot.own_bits + robot.received_bits) / len(robots)
+    for robot in robots:
+        gained = shared if team else robot.own_bits
+        robot.reward = gained / bits_to_gain - cost
 
 
 @lean_kernel

@@ -10,9 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import ndimage
 
-from baselines.cli.figures import COLOURS
 from baselines.experiments.experiment import Records
-from baselines.experiments.plots import one_axes
+from baselines.experiments.plots import COLOURS, one_axes
 from baselines.papers.bhattacharya.claims import exploring, first_floor
 from baselines.papers.bhattacharya.measured import ROBOTS, SHAPE, split, unknown_region
 from baselines.papers.bhattacharya.run import Run, start_cells, unpacked

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from baselines.cli.figures import COLOURS
 from baselines.experiments.experiment import Records, sample
-from baselines.experiments.plots import interval_line, one_axes
+from baselines.experiments.plots import COLOURS, interval_line, one_axes
 from baselines.experiments.rows import Record
 from baselines.experiments.statistics import mean_interval
 from baselines.papers.rocha04.claims import PAPER_T_MISSION_S

@@ -8,9 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from baselines.cli.figures import COLOURS
 from baselines.experiments.experiment import Records, sample
-from baselines.experiments.plots import interval_line, mean_band
+from baselines.experiments.plots import COLOURS, interval_line, mean_band
 from baselines.experiments.statistics import mean_interval
 from baselines.papers.rochami.claims import (
     PAPER_COORDINATED,

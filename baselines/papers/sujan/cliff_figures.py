@@ -8,10 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from baselines.cli.figures import COLOURS
 from baselines.experiments.experiment import Records
 from baselines.experiments.mission import run_mission, scripted_env
-from baselines.experiments.plots import mean_band, one_axes
+from baselines.experiments.plots import COLOURS, mean_band, one_axes
 from baselines.experiments.tables import markdown_table
 from baselines.papers.sujan.cliff_mission import (
     FEW,

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from baselines.cli.figures import COLOURS
 from baselines.experiments.claims import Claim, below
 from baselines.experiments.experiment import Amount, Experiment, Records, ratio_of, sample
 from baselines.experiments.mission import run_mission
+from baselines.experiments.plots import COLOURS
 from baselines.experiments.rows import Record
 from baselines.experiments.statistics import mean_interval, ratio_interval
 from baselines.experiments.tables import cells_table

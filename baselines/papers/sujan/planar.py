@@ -11,11 +11,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from baselines.cli.figures import COLOURS
 from baselines.experiments.claims import Claim, above, below
 from baselines.experiments.experiment import Amount, Experiment, Records
 from baselines.experiments.mission import Surroundings, run_mission
-from baselines.experiments.plots import mean_band
+from baselines.experiments.plots import COLOURS, mean_band
 from baselines.experiments.rows import Record
 from baselines.experiments.statistics import mean_interval, ratio_interval
 from baselines.experiments.tables import cells_table

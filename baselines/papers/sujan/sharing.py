@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from baselines.cli.figures import COLOURS
 from baselines.experiments.claims import Claim, below
 from baselines.experiments.experiment import Amount, Experiment, Records
 from baselines.experiments.mission import run_mission
+from baselines.experiments.plots import COLOURS
 from baselines.experiments.rows import Record
 from baselines.experiments.statistics import mean_interval, ratio_interval
 from baselines.experiments.tables import markdown_table

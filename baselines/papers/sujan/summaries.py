@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from baselines.cli.figures import COLOURS
 from baselines.experiments.claims import Claim, above
 from baselines.experiments.experiment import Amount, Experiment, Records
 from baselines.experiments.mission import run_mission
+from baselines.experiments.plots import COLOURS
 from baselines.experiments.rows import Record
 from baselines.experiments.statistics import interpolated_ratio_interval, mean_interval
 from baselines.experiments.tables import markdown_table
