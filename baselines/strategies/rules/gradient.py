@@ -14,10 +14,11 @@ import math
 import numpy as np
 
 from entropy_explore_env.belief.raycast import point
-from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.planner.driver import Driver, Trail
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.robots.rotations import dot, projection_on
 from entropy_explore_env.viewpoints.gradient_candidates import gradient_candidates
 
 
@@ -104,26 +105,12 @@ def _best(candidates, mean, position, ahead, left, projected):
         norm, reachable = candidate.steepness, 1.0
         if projected:
             way = place[0] - position[0], place[1] - position[1], place[2] - position[2]
-            gradient, along = _on_plane(gradient, ahead, left), _on_plane(way, ahead, left)
-            norm = math.sqrt(_dot(gradient, gradient))
+            gradient, along = projection_on(gradient, ahead, left), projection_on(way, ahead, left)
+            norm = math.sqrt(dot(gradient, gradient))
             if candidate.distance > 0.0:
-                reachable = math.sqrt(_dot(along, along)) / candidate.distance
+                reachable = math.sqrt(dot(along, along)) / candidate.distance
         uncovered = np.float32(1.0) - mean[int(place[0]), int(place[1]), int(place[2])]
         score = reachable * norm * np.float64(uncovered)
         if score > highest:
             best, highest, slope, steepness = number, score, gradient, norm
     return best, slope, steepness
-
-
-@inlined_kernel
-def _on_plane(vector, ahead, left):
-    """Return the projection (x, y, z) on the plane of a gaze and its left (eq. 37)."""
-    along, across = _dot(vector, ahead), _dot(vector, left)
-    x, y = along * ahead[0] + across * left[0], along * ahead[1] + across * left[1]
-    return x, y, along * ahead[2] + across * left[2]
-
-
-@inlined_kernel
-def _dot(a, b):
-    """Return the scalar product of two vectors (x, y, z)."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
