@@ -12,7 +12,7 @@ STYLE := $(RUN) ruff check . && $(RUN) ruff format --check . && $(VENV)/bin/lint
 WARM := $(RUN) entropy_explore_env warm --processes 1
 
 .PHONY: help demo new-user docs docs-links test test-long boundscheck test-rllib test-benchmarl lint bench policy \
-	reliability night reproduce clean
+	predictor reliability night reproduce clean
 .NOTPARALLEL:
 
 help:
@@ -28,6 +28,7 @@ help:
 	@echo "make test-benchmarl   the tutorial with BenchMARL"
 	@echo "make lint         ruff, pyright and the contracts of imports"
 	@echo "make bench        speed against peers"
+	@echo "make predictor    trains the network that predicts maps: about an hour of a processor"
 	@echo "make policy       searches weights of the planner's features: one to three hours of two processors"
 	@echo "make reliability  all proofs, into docs/results/reliability.md: many hours"
 	@echo "make night        some minutes of each proof, other cases every night"
@@ -63,7 +64,8 @@ test-long: $(STAMP)dev
 # Checks are part of what compiled kernels are named after: those without stay as they are.
 boundscheck: $(STAMP)dev
 	NUMBA_BOUNDSCHECK=1 $(RUN) pytest -n auto --maxprocesses 4 --dist worksteal \
-		tests/belief tests/robots tests/viewpoints tests/frontiers tests/planner tests/missions tests/baselines/strategies
+		tests/belief tests/prediction tests/robots tests/viewpoints tests/frontiers tests/planner tests/missions \
+		tests/baselines/strategies
 
 test-rllib: $(VENV_RLLIB)/installed
 	$(VENV_RLLIB)/bin/python -m pytest tests/training/rllib tests/training/test_rllib_refusals.py
@@ -81,6 +83,10 @@ bench: $(STAMP)training $(STAMP)bench
 # A stopped search goes on; what it finds is runs/weights/weights.json.
 policy: $(STAMP)training
 	$(RUN) training.search --tasks office:1 office:3 hybrid:1 --rounds 8 --pairs 30 --out runs/weights
+
+# The predictor of maps that comes with the library; a stopped run goes on. Dungeons are fetched.
+predictor: $(STAMP)training
+	$(RUN) training.map_predictor --missions 90 --validation-missions 12 --epochs 26 --threads 1 --out runs/map-predictor
 
 reliability: $(STAMP)dev
 	$(RUN) benchmarks.proofs --full --out docs/results/reliability.md

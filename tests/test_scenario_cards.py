@@ -31,7 +31,7 @@ from entropy_explore_env.settings.scenarios import SCENARIOS
 from tests.code_blocks import FENCED
 
 ALL_PARTS = {
-    "observation": {"drive": True, "patch": True, "overview": True, "action_mask": True},
+    "observation": dict.fromkeys(("drive", "patch", "overview", "prediction", "action_mask"), True),
     "action": {"kind": "discrete", "moves": "axes"},
 }
 

@@ -1,4 +1,4 @@
-"""Learning a policy: trainers, networks, checkpoints, and a policy as a strategy."""
+"""Learning a policy: trainers, networks, checkpoints, a policy as a strategy; a predictor of maps."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ class MoveAndGaze(CategoricalDistribution):
         return self._moves.argmax(dim=1) * self._sizes[1] + self._gazes.argmax(dim=1)
 
 
-_MAPS = ("patch", "overview")
+_MAPS = ("patch", "overview", "prediction")
 _HIDDEN = ("action_mask",)
 """Parts that networks do not read."""
 _CLIP = 10.0
@@ -114,7 +114,7 @@ class VectorFeatures(BaseFeaturesExtractor):
 
 
 class MapFeatures(VectorFeatures):
-    """The vector, and features of the patch around the robot and of the overview from small convolutions.
+    """The vector, and features of maps from small convolutions: patch, overview and prediction.
 
     Maps one voxel high get two-dimensional convolutions, others three-dimensional ones. Maps hold numbers
     from 0 to 1 and are not normalised.
@@ -142,15 +142,20 @@ class MapFeatures(VectorFeatures):
         """Return the features (N, K) of observations (N, F)."""
         seen = [super().forward(observations)]
         for name, part in self._maps.items():
-            cells = observations[:, part.start : part.stop].reshape(-1, *part.shape)
-            flat = part.shape[3] == 1
-            seen.append(self.convolutions[name](cells[..., 0] if flat else cells))
+            shape = part.shape[:3] if _is_flat(part.shape) else part.shape
+            cells = observations[:, part.start : part.stop].reshape(-1, *shape)
+            seen.append(self.convolutions[name](cells))
         return torch.cat(seen, dim=1)
+
+
+def _is_flat(shape: tuple[int, ...]) -> bool:
+    """Return whether a map (C, x, y[, z]) is one cell high."""
+    return len(shape) == 3 or shape[3] == 1
 
 
 def _convolution(shape: tuple[int, ...], channels: int, features: int) -> nn.Module:
     """Return a network from maps (N, C, x, y[, z]) to (N, features)."""
-    flat = shape[3] == 1
+    flat = _is_flat(shape)
     convolution = nn.Conv2d if flat else nn.Conv3d
     layers = nn.Sequential(
         convolution(shape[0], channels, 3, padding=1),

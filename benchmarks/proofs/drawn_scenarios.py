@@ -161,6 +161,8 @@ def _tuple(rng: np.random.Generator, name: str, scenario: Scenario) -> Any:  # n
         return tuple(rng.permutation(scenario.robots)[: int(rng.integers(0, 4))].tolist())
     if name == "patch_shape":
         return tuple((2 * rng.integers(0, 6, 3) + 1).tolist())
+    if name == "prediction_shape":
+        return tuple((2 * rng.integers(0, 56, 2) + 1).tolist())
     if name == "overview_shape":
         return tuple(rng.integers(1, 12, 3).tolist())
     if name == "field_of_view_rad":

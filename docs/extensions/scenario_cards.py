@@ -240,7 +240,7 @@ def _actions(scenario: Scenario) -> str:
 
 def _observation(scenario: Scenario) -> str:
     """Every number of the default observation, and of the parts on request."""
-    everything = {"drive": True, "patch": True, "overview": True, "overlaps": True}
+    everything = dict.fromkeys(("drive", "patch", "overview", "prediction", "overlaps"), True)
     asked = with_settings(scenario, {"observation": everything, "action": {"kind": "candidates"}})
     default = observation_numbers(scenario)
     lines = [

@@ -146,6 +146,13 @@ def _told(name: str, part: Part, scenario: Scenario) -> list[_Told]:
             _Told(cells, "mean entropy of each block of the map: 1 unknown, 0 known well enough", "share"),
             _Told(cells, "mean expected coverage of each block", "-"),
         ]
+    if name == "prediction":
+        return [
+            _Told(
+                cells, "probability of the cells around the robot to be solid: predicted, or measured", "-"
+            ),
+            _Told(cells, "1 where something was measured", "-"),
+        ]
     return [_Told(math.prod(part.shape), "1 for each action by number that makes sense", "-")]
 
 

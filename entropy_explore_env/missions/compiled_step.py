@@ -23,6 +23,7 @@ from entropy_explore_env.missions.tick import step_missions
 from entropy_explore_env.missions.workspace import Workspace, new_workspace
 from entropy_explore_env.planner.model import Proposer, new_proposers
 from entropy_explore_env.planner.records import Kind
+from entropy_explore_env.prediction.predictor import predicting_of
 from entropy_explore_env.robots.navigator import new_navigators
 from entropy_explore_env.settings.scenario import Scenario
 
@@ -59,6 +60,7 @@ class CompiledStep:
         navigators: Of each thread, by the kind of robot: paths through beliefs. Empty where no robot plans.
         proposers: Of each thread, for each kind of robot: candidates as actions. Empty without them.
         work: Of each thread: scratch memory.
+        predicting: Of each thread: what predictions need; None where none is observed.
     """
 
     def __init__(
@@ -86,6 +88,7 @@ class CompiledStep:
             new_proposers(scenario) if proposed else [] for _ in range(threads)
         ]
         self.work: list[Workspace] = [new_workspace(scenario, navigators) for navigators in self.navigators]
+        self.predicting = [predicting_of(scenario.observation) for _ in range(threads)]
 
     @property
     def proposes(self) -> bool:
@@ -149,7 +152,8 @@ class CompiledStep:
         if not self._observes:
             return
         crossing = Crossing(scan.crossed[0], scan.entered)
-        arguments = (self._rules, self._offsets, calls.observed, crossing, first, last, arrays.observations)
+        scratch = (crossing, self.predicting[thread])
+        arguments = (self._rules, self._offsets, calls.observed, *scratch, first, last, arrays.observations)
         observe = calls.observe
         if observe is None:
             observe = entry_point(observe_missions, *arguments)

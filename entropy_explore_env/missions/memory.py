@@ -12,6 +12,7 @@ from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.missions.observation.layout import observation_parts
 from entropy_explore_env.missions.rules import discrete_moves, gaze_set, overview_shape
 from entropy_explore_env.missions.state import state_arrays
+from entropy_explore_env.prediction.predictor import scratch_bytes
 from entropy_explore_env.robots.range_sensor import scan_bytes
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
@@ -45,6 +46,7 @@ _SETTING_OF_PART = {
     "team": "Observation.team",
     "patch": "Observation.patch_shape",
     "overview": "Observation.overview_shape",
+    "prediction": "Observation.prediction_shape",
     "candidates": "Action.candidates",
     "context": "Observation.candidates",
     "overlaps": "Observation.overlaps",
@@ -117,6 +119,7 @@ def _scratch_needs(scenario: Scenario, batch: Batch) -> list[Need]:
     scans = scan_bytes(scenario.grid, sensors, max(sensor.rays for sensor in sensors))
     plans = any(kind.robot.navigator == "planned" for kind in scenario.kinds) * _SEARCH_BYTES * voxels
     proposing = (scenario.action.kind == "candidates") * _PROPOSAL_BYTES * voxels
+    predicting = scenario.observation.prediction * scratch_bytes()
     masks = 0
     if scenario.action.kind == "discrete":
         gazes = gaze_set(scenario.action.yaws, 1 if scenario.planar else scenario.action.pitches)
@@ -127,6 +130,7 @@ def _scratch_needs(scenario: Scenario, batch: Batch) -> list[Need]:
         Need("paths", batch.threads * plans, most or "Grid.voxel_size_m"),
         Need("proposing candidates", batch.threads * proposing, most or "Grid.voxel_size_m"),
         Need("action masks", masks, "Robot.reach_m"),
+        Need("predictions", batch.threads * predicting, most or "Observation.prediction"),
     ]
 
 

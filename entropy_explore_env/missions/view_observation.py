@@ -15,6 +15,7 @@ from entropy_explore_env.missions.observation.observe import Known, observe_robo
 from entropy_explore_env.missions.rules import rules_of
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_candidates import ViewProposer, writable
+from entropy_explore_env.prediction.predictor import predicting_of
 from entropy_explore_env.robots.range_sensor import new_scan
 from entropy_explore_env.settings.action import Action
 from entropy_explore_env.settings.changes import with_settings
@@ -52,6 +53,7 @@ class ViewObserver:
         sensors = [kind.sensor for kind in scenario.kinds]
         scan = new_scan(scenario.grid, sensors, 1)
         self._crossing = Crossing(scan.crossed[0], scan.entered)
+        self._predicting = predicting_of(observation)
         self._pooled = np.zeros((2, len(self._rules.cells.voxels)))
         self._proposer: ViewProposer | None = None
         if action.kind == "candidates":
@@ -83,7 +85,8 @@ class ViewObserver:
             precision,
             self._pooled,
         )
-        observe_robot(self._rules, self._offsets, view.robot, known, self._crossing, out)
+        scratch = (self._crossing, self._predicting)
+        observe_robot(self._rules, self._offsets, view.robot, known, *scratch, out)
         if self._proposer is not None:
             self._describe_candidates(self._proposer, view, out)
         return out

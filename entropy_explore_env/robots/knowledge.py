@@ -7,9 +7,11 @@ missions know. Places are in the map frame, in metres; angles are in radians.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
+from entropy_explore_env.prediction.predictor import Prediction, shipped_predictor
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
@@ -125,6 +127,20 @@ class RobotKnowledge:
     def kind(self) -> RobotKind:
         """How it moves and what it senses."""
         return self.scenario.kind_of(self.robot)
+
+    @cached_property
+    def prediction(self) -> Prediction:
+        """What is predicted around the robot where its map holds nothing, as of the first look at it.
+
+        By the predictor that comes with the library, in horizontal cells of the band of heights that the
+        robot's body passes (`prediction.predictor`).
+
+        Raises:
+            SettingError: The map holds a number that is not finite.
+        """
+        grid, radius_m = self.scenario.grid, self.kind.robot.body_radius_m
+        known = (self.mean, self.precision, self.scenario.sigma_prior)
+        return shipped_predictor().predict(grid, *known, self.pose, radius_m)
 
     @property
     def planar(self) -> bool:

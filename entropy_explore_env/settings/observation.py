@@ -8,6 +8,10 @@ from typing import Literal
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.validation import check_choice, check_count, check_counts, check_kind
 
+MOST_PREDICTED = 111
+"""Most cells of a prediction along an axis: a crop of the network has 128, and its place is not quite in the
+middle."""
+
 
 @dataclass(frozen=True)
 class Observation:
@@ -25,6 +29,9 @@ class Observation:
         patch_shape: Voxels of the patch along x, y and z; odd, the robot in the middle.
         overview: The whole belief, pooled.
         overview_shape: Cells of the pooled belief along x, y and z, at most the world's.
+        prediction: What a network predicts where the robot has measured nothing, in horizontal cells of 0.2 m
+            around it. It was trained in plans; robots that fly observe the band of heights about them.
+        prediction_shape: Cells of the prediction along x and y; odd, the robot in the middle one.
         candidates: With candidates as actions, the features of each (part `candidates`) and of all of them
             (part `context`).
         overlaps: With candidates as actions, the share of what one sees that another sees.
@@ -45,6 +52,8 @@ class Observation:
     patch_shape: tuple[int, int, int] = (11, 11, 5)
     overview: bool = False
     overview_shape: tuple[int, int, int] = (8, 8, 4)
+    prediction: bool = False
+    prediction_shape: tuple[int, int] = (65, 65)
     candidates: bool = True
     overlaps: bool = False
     action_mask: bool = False
@@ -64,3 +73,6 @@ class Observation:
         if not all(n % 2 for n in self.patch_shape):
             raise SettingError("Observation.patch_shape", self.patch_shape, "odd numbers only")
         check_counts(self, "overview_shape", 1, 64)
+        check_counts(self, "prediction_shape", 1, MOST_PREDICTED, ("x", "y"))
+        if not all(n % 2 for n in self.prediction_shape):
+            raise SettingError("Observation.prediction_shape", self.prediction_shape, "odd numbers only")

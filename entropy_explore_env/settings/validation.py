@@ -103,11 +103,18 @@ def check_count(settings: object, name: str, least: int, most: int) -> None:
         )
 
 
-def check_counts(settings: object, name: str, least: int, most: int) -> None:
-    """Check that the field is three whole numbers, each in a range."""
-    value = getattr(settings, name)
-    if not isinstance(value, tuple) or len(value) != 3 or not all(is_whole(n, least, most) for n in value):
-        allowed = f"a tuple of three whole numbers (x, y, z), each from {least} to {most}"
+def check_counts(
+    settings: object, name: str, least: int, most: int, axes: tuple[str, ...] = ("x", "y", "z")
+) -> None:
+    """Check that the field is a whole number for each axis, each in a range."""
+    value, count = getattr(settings, name), len(axes)
+    if (
+        not isinstance(value, tuple)
+        or len(value) != count
+        or not all(is_whole(n, least, most) for n in value)
+    ):
+        number = {2: "two", 3: "three"}[count]
+        allowed = f"a tuple of {number} whole numbers ({', '.join(axes)}), each from {least} to {most}"
         raise SettingError(f"{type(settings).__name__}.{name}", value, allowed)
 
 

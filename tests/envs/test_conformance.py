@@ -43,6 +43,7 @@ OWN: dict[str, dict[str, Any]] = {
         "grid": Grid((9, 6, 1), 0.5),
         "world": "furnished",
         "ending": {"sigma_end": 3.0, "termination": "all", "max_cycles": 20},
+        "observation": {"prediction": True, "prediction_shape": (9, 21)},
     },
 }
 

@@ -10,6 +10,7 @@ from entropy_explore_env.missions.poses import pose_at
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.settings.ending import gaussian_entropy_bits
 from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.observation import MOST_PREDICTED
 from entropy_explore_env.viewpoints.evaluation import robot_model
 from tests.reference import rocha04
 from tests.reference.scenes import as_reference, free_box, put, random_actions, started, wander
@@ -21,6 +22,8 @@ EVERYTHING = {
     "patch_shape": (5, 7, 3),
     "overview": True,
     "overview_shape": (3, 4, 2),
+    "prediction": True,
+    "prediction_shape": (5, 9),
     "action_mask": True,
 }
 SETTINGS = {
@@ -35,7 +38,12 @@ SETTINGS = {
         "grid": Grid((13, 9, 1), 0.5, (-1.0, 2.0, 0.0)),
         "robots": 2,
         "world": "furnished",
-        "observation": {**EVERYTHING, "patch_shape": (5, 7, 1), "overview_shape": (4, 3, 1)},
+        "observation": {
+            **EVERYTHING,
+            "patch_shape": (5, 7, 1),
+            "overview_shape": (4, 3, 1),
+            "prediction_shape": (MOST_PREDICTED, 3),
+        },
     },
     "planar, discrete": {
         "robots": 2,
@@ -92,7 +100,7 @@ def normalised(missions, precision):
 
 def test_the_parts_are_those_asked_for(mission):
     missions, parts = mission
-    expected = ["panorama", "self", "drive", "team", "patch", "overview"]
+    expected = ["panorama", "self", "drive", "team", "patch", "overview", "prediction"]
     if missions.scenario.action.kind == "discrete":
         expected.append("action_mask")
     assert list(parts[0]) == expected
@@ -209,6 +217,29 @@ def test_overview(mission):
             )
             assert part["overview"][(0, *cell)] == pytest.approx(entropy[block].mean(), abs=1e-5)
             assert part["overview"][(1, *cell)] == pytest.approx(mean[block].mean(), abs=1e-5)
+
+
+def test_prediction_is_that_of_the_view(mission):
+    """Cells of 0.2 m around the robot's own, whatever the voxels; of the band that its body passes."""
+    missions, parts = mission
+    told = set()
+    for robot, part in enumerate(parts):
+        view = view_of(missions, 0, robot)
+        found = view.prediction
+        x, y = found.cell_of(view.pose)
+        across, along = missions.scenario.observation.prediction_shape
+        low_x, low_y = x - across // 2, y - along // 2
+        cut = np.s_[low_x : low_x + across, low_y : low_y + along]
+        np.testing.assert_array_equal(part["prediction"][0], found.solid[cut])
+        np.testing.assert_array_equal(part["prediction"][1], found.measured[cut])
+        told |= set(part["prediction"][1].ravel().tolist())
+        radius = missions.scenario.robot.body_radius_m / missions.grid.voxel_size_m
+        height = (view.pose[2] - missions.grid.origin_m[2]) / missions.grid.voxel_size_m
+        layers = np.arange(missions.grid.shape[2])
+        passed = layers[(layers + 1 > height - radius + 1e-6) & (layers < height + radius - 1e-6)]
+        assert found.layers == (passed[0], passed[-1] + 1)
+        assert view.prediction is found
+    assert told == {0.0, 1.0}
 
 
 def panorama_gazes(missions):

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from entropy_explore_env import EntropyExploreVectorEnv, parallel_env
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import view_of
+from entropy_explore_env.prediction import predictor
 from entropy_explore_env.robots.motion import MoveEnd
 from tests.reference.scenes import free_box, started, wander
 
@@ -110,3 +112,39 @@ def test_a_policy_observes_what_was_heard_as_it_was():
     view = silent_views(100.0)
     assert view.heard[1]["announced_s"] == 0.5 and view.heard[1]["announced"][5] == 2.0
     assert not view.heard.flags.writeable
+
+
+def test_a_prediction_is_of_the_robot_s_own_map_as_it_first_looks():
+    missions = started(free_box(robots=2, channel={"loss_probability": 1.0}), seed=2)
+    before = view_of(missions, 0, 0)
+    blank = before.prediction.measured.copy()
+    wander(missions, 6, 3)
+    assert np.array_equal(before.prediction.measured, blank)
+    views = [view_of(missions, 0, robot) for robot in (0, 1)]
+    for view in views:
+        found, edge = view.prediction, missions.grid.voxel_size_m
+        known = view.map.known & (np.arange(missions.grid.shape[2]) >= found.layers[0])
+        known = known & (np.arange(missions.grid.shape[2]) < found.layers[1])
+        for x, y in np.argwhere(found.measured):
+            low = found.origin_m + 0.2 * np.array([x, y]) - missions.grid.origin_m[:2]
+            first, last = np.floor(low / edge + 1e-6), np.ceil((low + 0.2) / edge - 1e-6)
+            over = tuple(slice(int(a), int(b)) for a, b in zip(first, last, strict=True))
+            assert found.solid[x, y] == view.mean[over][known[over]].max()
+        assert found.measured.any() and not np.array_equal(found.measured, blank)
+    assert not np.array_equal(views[0].prediction.solid, views[1].prediction.solid)
+
+
+@pytest.mark.parametrize("name", ["mean", "precision"])
+def test_a_map_with_a_number_that_is_not_finite_is_not_predicted(name):
+    missions = started(free_box(), seed=2)
+    getattr(missions.state, name)[0, 0, 5] = np.nan
+    with pytest.raises(SettingError, match=f"{name} = 'a number that is not finite'"):
+        _ = view_of(missions, 0, 0).prediction
+
+
+def test_without_the_part_no_weights_are_read(monkeypatch):
+    monkeypatch.setattr(predictor, "shipped_predictor", lambda: pytest.fail("read"))
+    for form in ({}, {"patch": True, "overview": True, "flat": True}):
+        missions = started(free_box(observation=form), seed=1)
+        assert "prediction" not in missions.layout.parts
+        view_of(missions, 0, 0)

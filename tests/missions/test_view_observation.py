@@ -17,6 +17,8 @@ EVERYTHING = Observation(
     patch=True,
     overview=True,
     overview_shape=(3, 4, 2),
+    prediction=True,
+    prediction_shape=(9, 15),
     action_mask=True,
     panorama_utility="log2",
 )

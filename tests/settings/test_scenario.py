@@ -131,7 +131,8 @@ REFUSED = {
     **dict.fromkeys(
         fields_of(
             Observation,
-            "panorama self_state drive team patch overview action_mask candidates overlaps flat while_busy",
+            "panorama self_state drive team patch overview prediction action_mask candidates overlaps "
+            "flat while_busy",
         ),
         SWITCH,
     ),
@@ -145,6 +146,16 @@ REFUSED = {
         (11, 11, 257),
         (11.0, 11, 5),
         11,
+        None,
+    ),
+    (Observation, "prediction_shape"): (
+        (65, 65, 1),
+        [65, 65],
+        (64, 65),
+        (65, 113),
+        (0, 1),
+        (65.0, 65),
+        65,
         None,
     ),
     (Observation, "overview_shape"): ((8, 8), [8, 8, 4], (0, 8, 4), (65, 8, 4), (8.0, 8, 4), None),
@@ -249,6 +260,7 @@ ACCEPTED = [
     (Reward, {"kind": "team", "cost_per_s": 0}),
     (Action, {"kind": "discrete", "yaws": 1, "pitches": 1}),
     (Observation, {"panorama_yaws": 1, "panorama_utility": "log2", "patch_shape": (1, 1, 1)}),
+    (Observation, {"prediction_shape": (1, 111)}),
 ]
 
 

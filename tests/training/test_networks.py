@@ -35,7 +35,8 @@ def observations(there: Scenario, count: int = 5) -> torch.Tensor:
 
 
 def test_vectors_are_the_parts_that_are_no_maps_scaled_and_clipped() -> None:
-    there = scenario(patch=True, patch_shape=(3, 5, 3), overview=True, action_mask=True)
+    maps = {"patch": True, "patch_shape": (3, 5, 3), "overview": True, "prediction": True}
+    there = scenario(**maps, action_mask=True)
     layout, seen = ObservationLayout(there), observations(there)
     features = VectorFeatures(layout.flat_space(), layout)
     names = ("panorama", "self", "team")
@@ -48,7 +49,7 @@ def test_vectors_are_the_parts_that_are_no_maps_scaled_and_clipped() -> None:
 
 @pytest.mark.parametrize(
     ("name", "parts"),
-    [("box-7x11x5", ("patch", "overview")), ("office", ("overview",)), ("office", ("patch",))],
+    [("box-7x11x5", ("patch", "overview")), ("office", ("overview", "prediction")), ("office", ("patch",))],
 )
 def test_maps_are_looked_at_whether_flat_or_not(name: str, parts: tuple[str, ...]) -> None:
     """A change of any cell of a map changes the features; without maps none would."""

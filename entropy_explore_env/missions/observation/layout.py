@@ -22,6 +22,9 @@ Parts, in this order, each only if the scenario's settings ask for it (D directi
                            outside the workspace, 1 where a teammate was last heard
     overview  (2, x, y, z) the whole belief, averaged over blocks: normalised entropy, expected
                            coverage
+    prediction (2, x, y)   cells of 0.2 m around the robot: probability to be solid, where nothing was
+                           measured by a network (`prediction`), else by the belief; 1 where
+                           something was measured
     candidates (K, F)      candidates as actions: their features, `viewpoints.candidate_features.FEATURES`;
                            zeros for those that there are not, and while the robot is busy
     context   (C,)         what is true of all of them, `viewpoints.candidate_features.CONTEXT`; likewise
@@ -47,6 +50,7 @@ from entropy_explore_env.missions.observation.overview import OVERVIEW_CHANNELS
 from entropy_explore_env.missions.observation.own_drive import DRIVE_VALUES
 from entropy_explore_env.missions.observation.own_state import SELF_VALUES
 from entropy_explore_env.missions.observation.patch import PATCH_CHANNELS
+from entropy_explore_env.missions.observation.predicted import PREDICTION_CHANNELS
 from entropy_explore_env.missions.observation.team import TEAMMATE_VALUES
 from entropy_explore_env.missions.rules import Rules, overview_shape, rules_of
 from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
@@ -161,6 +165,8 @@ def observation_parts(scenario: Scenario) -> dict[str, Part]:
         limits["patch"] = ((PATCH_CHANNELS, *settings.patch_shape), 0.0, one)
     if (cells := overview_shape(scenario)) is not None:
         limits["overview"] = ((OVERVIEW_CHANNELS, *cells), 0.0, one)
+    if settings.prediction:
+        limits["prediction"] = ((PREDICTION_CHANNELS, *settings.prediction_shape), 0.0, one)
     if scenario.action.kind == "candidates":
         limits.update(_candidate_parts(scenario))
     if settings.action_mask and scenario.action.by_number:
@@ -211,9 +217,11 @@ class PartOffsets(NamedTuple):
     team: int | None
     patch: int | None
     overview: int | None
+    prediction: int | None
     action_mask: int | None
     """Of discrete actions."""
     patch_shape: tuple[int, int, int]
+    prediction_shape: tuple[int, int]
     kinds: int
     """K, of robots; 0 if all are alike."""
     while_busy: bool
@@ -241,12 +249,14 @@ def candidate_offsets(scenario: Scenario, layout: ObservationLayout) -> Candidat
 def part_offsets(scenario: Scenario, layout: ObservationLayout) -> PartOffsets:
     """Return what compiled code needs of a layout."""
     begin = {name: part.start for name, part in layout.parts.items()}
-    patch = scenario.observation.patch_shape
+    patch, predicted = scenario.observation.patch_shape, scenario.observation.prediction_shape
+    names = ("panorama", "self", "drive", "team", "patch", "overview", "prediction", "action_mask")
     if scenario.action.kind == "candidates":  # which are written elsewhere
         begin.pop("action_mask", None)
     return PartOffsets(
-        *map(begin.get, ("panorama", "self", "drive", "team", "patch", "overview", "action_mask")),
+        *map(begin.get, names),
         patch_shape=(int(patch[0]), int(patch[1]), int(patch[2])),
+        prediction_shape=(int(predicted[0]), int(predicted[1])),
         kinds=len(scenario.kinds) if len(scenario.kinds) > 1 else 0,
         while_busy=scenario.observation.while_busy,
     )

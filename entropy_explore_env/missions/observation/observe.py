@@ -14,6 +14,7 @@ from entropy_explore_env.missions.observation.own_drive import observe_drive
 from entropy_explore_env.missions.observation.own_state import observe_self
 from entropy_explore_env.missions.observation.panorama import observe_panorama
 from entropy_explore_env.missions.observation.patch import observe_patch
+from entropy_explore_env.missions.observation.predicted import observe_prediction
 from entropy_explore_env.missions.observation.team import observe_team
 from entropy_explore_env.missions.poses import pose_at, speed_at, within_grid
 
@@ -60,10 +61,11 @@ class Observed(NamedTuple):
 
 
 @lean_kernel
-def observe_robot(rules, offsets, robot, known, crossing, out):
+def observe_robot(rules, offsets, robot, known, crossing, predicting, out):
     """Fill the flat observation of one robot.
 
     Args:
+        predicting: Predicting; None = no prediction is observed, and nothing of it is compiled.
         out: (F,) float32, filled in.
     """
     params, sensor = rules.params[robot], rules.sensors.params[robot]
@@ -74,14 +76,16 @@ def observe_robot(rules, offsets, robot, known, crossing, out):
     observe_team(offsets.team, params, robot, known, out)
     observe_patch(offsets.patch, params, offsets.patch_shape, robot, start, known, out)
     observe_overview(offsets.overview, rules.cells, known.pooled, out)
+    observe_prediction(offsets.prediction, params, offsets.prediction_shape, start, known, predicting, out)
     observe_mask(offsets.action_mask, params, rules.actions, start, known.mean, out)
 
 
 @lean_kernel
-def observe_missions(rules, offsets, observed, crossing, first, last, out):
+def observe_missions(rules, offsets, observed, crossing, predicting, first, last, out):
     """Fill the flat observations of missions' robots, each from where it is now.
 
     Args:
+        predicting: As in `observe_robot`.
         out: (E, A, F) float32, filled in.
     """
     for mission in range(first, last):
@@ -105,4 +109,4 @@ def observe_missions(rules, offsets, observed, crossing, first, last, out):
                 observed.precision[mission, robot],
                 observed.pooled[mission, robot],
             )
-            observe_robot(rules, offsets, robot, known, crossing, row)
+            observe_robot(rules, offsets, robot, known, crossing, predicting, row)

@@ -1,0 +1,374 @@
+"""Learn to predict what of a map was never measured: a small U-Net, trained on missions of strategies.
+
+    python -m training.map_predictor --out runs/map-predictor
+    python -m training.map_predictor --leave-out office --out runs/without-office
+    python -m training.map_predictor --weights runs/map-predictor/predictor.safetensors --out runs/again
+
+Samples are cut from missions (`training.map_samples`), turned and mirrored at random. The loss is the log
+loss of the cells in which nothing was measured, and of no others; the weights that are kept are a moving
+average. The folder gets the samples, `training.safetensors` after every epoch, and at the end
+
+    predictor.safetensors   the weights, read by `prediction.weights`
+    predictor.json          options, and figures on worlds of validation (`training.map_scores`)
+    predictor.png           partial maps, their predictions and the truth; a reliability diagram
+
+The same command goes on where it was interrupted, and comes to the same weights. Dungeons are public worlds:
+they are fetched, or read from the folder that ENTROPY_EXPLORE_WORLDS names.
+"""
+
+from __future__ import annotations
+
+from training import extra  # noqa: F401 - before what is not there without it
+
+# isort: split
+
+import json
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+from torch import nn
+from torch.nn import functional
+
+from baselines.cli.arguments import make_folder, parse, print_json, run_command
+from baselines.cli.interruption import Interruption
+from baselines.cli.worker_options import WorkerOptions
+from entropy_explore_env.command import INTERRUPTED
+from entropy_explore_env.errors import SettingError, one_of
+from entropy_explore_env.prediction.unet import LEVELS, layer_shapes
+from entropy_explore_env.prediction.weights import FEATURES, read_network
+from entropy_explore_env.settings.validation import check_whole
+from entropy_explore_env.version import VERSION
+from entropy_explore_env.writing import write_atomically
+from training.map_samples import (
+    RECIPES,
+    Samples,
+    as_channels,
+    make_samples,
+    read_samples,
+    sampled_missions,
+    unmeasured,
+)
+from training.map_scores import draw_figure, figures_of, nearest_shares, predictions, scored
+
+_STOPPED = "this mission or epoch is done first; the same command goes on"
+_AVERAGED = 0.998
+"""Share of the moving average of the weights that stays at each step."""
+_DECAY = 1e-4
+_WARM = 0.05
+"""Share of the steps in which the rate grows to its largest."""
+_NEAREST_SAMPLES = 600
+"""Samples of training from which the shares of the baseline `nearest` come."""
+_REPORTED = ("recipes", "leave_out", "missions", "validation_missions", "snapshots", "epochs", "batch")
+_OPTIONS = (*_REPORTED, "rate", "seed")
+"""Options that determine the weights."""
+
+
+@dataclass
+class Args(WorkerOptions):
+    """Learn to predict what of a map was never measured."""
+
+    usual: ClassVar = (
+        *("recipes", "leave_out", "out", "weights", "missions", "validation_missions", "snapshots"),
+        *("epochs", "batch", "rate", "seed", "threads", "jobs", "cluster", "json"),
+    )
+
+    recipes: tuple[str, ...] = RECIPES
+    """What worlds are learned from: office, corridor, cluttered, hybrid, dungeon."""
+    leave_out: str | None = None
+    """One of these recipes that is not learned from; the figures tell of it all the same."""
+    out: Path = Path("runs/map-predictor")
+    """Folder of the run; the same command goes on with what is there."""
+    weights: Path | None = None
+    """A file of weights to be scored; nothing is learned then."""
+    missions: int = 250
+    """Missions of training in each recipe."""
+    validation_missions: int = 20
+    """Missions of validation in each recipe."""
+    snapshots: int = 16
+    """Samples of a mission at most."""
+    epochs: int = 40
+    """How often all samples are learned from."""
+    batch: int = 16
+    """Samples of a step."""
+    rate: float = 2e-3
+    """Largest learning rate; it ends at 0."""
+    seed: int = 0
+    """Seed of missions, of weights and of the order of samples."""
+    threads: int = 2
+    """Threads for learning; sums may come out in another order with another number."""
+    json: bool = False
+    """Print one JSON object and nothing else."""
+
+
+def main(words: Sequence[str]) -> int:
+    """Run the command."""
+    args = parse(Args, words, description=__doc__)
+    check(args)
+    network = None if args.weights is None else read_network(args.weights)
+    workers = args.workers
+    make_folder("out", args.out)
+    with Interruption(_STOPPED) as interruption:
+        asked = {
+            split: sampled_missions(args.recipes, split, count, args.snapshots, args.seed)
+            for split, count in (("train", args.missions), ("validation", args.validation_missions))
+        }
+        every, folder = [*asked["validation"], *asked["train"]], args.out / "samples"
+        for done, _ in enumerate(make_samples(every, folder, workers, interruption)):
+            _tell(args, f"{done + 1} missions sampled", done % 20 == 0)
+        if interruption.asked:
+            return _interrupted(args)
+        learned = [each for each in asked["train"] if each.recipe != args.leave_out]
+        samples, validation = read_samples(folder, learned)[0], read_samples(folder, asked["validation"])
+        if network is None:
+            model = train(args, samples, interruption)
+            if model is None:
+                return _interrupted(args)
+            write_atomically(args.out / "predictor.safetensors", save(model.named(), FEATURES))
+            network = read_network(args.out / "predictor.safetensors")
+    predicted = predictions(network, validation[0])
+    every_nth = max(len(samples.truth) // _NEAREST_SAMPLES, 1)
+    shares = nearest_shares(Samples(*(values[::every_nth] for values in samples)))
+    figures = figures_of(scored(*validation, predicted, shares))
+    told = {name: getattr(args, name) for name in (*_OPTIONS, "threads")}
+    told |= {"weights": None if args.weights is None else args.weights.name, "version": VERSION}
+    told |= {"samples": len(samples.truth), "validation_samples": len(validation[1])}
+    results = {"options": told, "figures": figures}
+    write_atomically(args.out / "predictor.json", json.dumps(results, indent=1, allow_nan=False) + "\n")
+    draw_figure(args.out / "predictor.png", *validation, predicted, figures)
+    if args.json:
+        print_json(results)
+    else:
+        print(table_text(figures, args.leave_out))
+    return 0
+
+
+def check(args: Args) -> None:
+    """Raise a SettingError where an option is out of its range."""
+    if not args.recipes:
+        raise SettingError("recipes", args.recipes, f"some of {', '.join(RECIPES)}")
+    for name in args.recipes:
+        if name not in RECIPES:
+            raise SettingError("recipes", name, one_of(name, RECIPES))
+    if args.leave_out is not None and args.leave_out not in args.recipes:
+        raise SettingError("leave_out", args.leave_out, one_of(args.leave_out, args.recipes))
+    if args.recipes == (args.leave_out,):
+        raise SettingError("leave_out", args.leave_out, "not the only recipe")
+    for name in ("missions", "validation_missions", "snapshots", "epochs", "batch", "threads"):
+        check_whole(name, getattr(args, name), 1)
+    check_whole("seed", args.seed, 0)
+    if not 0.0 < args.rate < math.inf:
+        raise SettingError("rate", args.rate, "a number above 0")
+
+
+def _tell(args: Args, text: str, now: bool = True) -> None:
+    """Tell of progress, beside the results."""
+    if now and not args.json:
+        print(text, file=sys.stderr, flush=True)
+
+
+def _interrupted(args: Args) -> int:
+    print(f"stopped; the same command goes on with what is in {args.out}", file=sys.stderr)
+    return INTERRUPTED
+
+
+class UNet(nn.Module):
+    """The network of `prediction.unet`, for learning."""
+
+    def __init__(self) -> None:
+        """Draw weights as PyTorch does."""
+        super().__init__()
+        shapes = layer_shapes()
+        self.first, self.second, self.lift, self.merge = (
+            nn.ModuleList(
+                nn.Conv2d(inputs, outputs, math.isqrt(taps), padding=math.isqrt(taps) // 2)
+                for name, (outputs, inputs, taps) in shapes.items()
+                if name.startswith(f"{part}.")
+            )
+            for part in ("first", "second", "lift", "merge")
+        )
+        outputs, inputs, _ = shapes["head"]
+        self.head = nn.Conv2d(inputs, outputs, 1)
+
+    def forward(self, cells: torch.Tensor) -> torch.Tensor:
+        """Return the logits (B, C, C) of cells (B, 3, C, C)."""
+        values, finer = functional.pixel_unshuffle(cells, 2), []
+        for level in range(LEVELS):
+            if level > 0:
+                values = functional.max_pool2d(values, 2)
+            values = functional.relu(self.first[level](values))
+            values = functional.relu(self.second[level](values))
+            finer.append(values)
+        for level in range(LEVELS - 2, -1, -1):
+            lifted = functional.interpolate(self.lift[level](values), scale_factor=2, mode="nearest")
+            values = functional.relu(self.merge[level](finer[level] + lifted))
+        return functional.pixel_shuffle(self.head(values), 2)[:, 0]
+
+    def named(self) -> dict[str, torch.Tensor]:
+        """Return the weights by name, each in memory of its own."""
+        return {name: values.detach().contiguous().clone() for name, values in self.state_dict().items()}
+
+
+def masked_loss(logits: torch.Tensor, truth: torch.Tensor, asked: torch.Tensor) -> torch.Tensor:
+    """Return the mean log loss, nats, of the cells that are asked for; all (B, C, C)."""
+    losses = functional.binary_cross_entropy_with_logits(logits, truth, reduction="none")
+    return (losses * asked).sum() / asked.sum().clamp(min=1.0)
+
+
+def drawn_batch(samples: Samples, chosen: np.ndarray, rng: np.random.Generator) -> list[torch.Tensor]:
+    """Return cells, truth and what is asked for of some samples, all turned and mirrored in one way."""
+    cells, truth = samples.cells[chosen], samples.truth[chosen]
+    asked = unmeasured(cells)
+    turns, mirrored = int(rng.integers(4)), bool(rng.integers(2))
+    batch = []
+    for values in (as_channels(cells), truth.astype(np.float32), asked.astype(np.float32)):
+        turned = np.rot90(values, turns, axes=(-2, -1))
+        turned = turned.swapaxes(-2, -1) if mirrored else turned
+        batch.append(torch.from_numpy(np.ascontiguousarray(turned)))
+    return [batch[0].contiguous(memory_format=torch.channels_last), *batch[1:]]
+
+
+def rate_at(args: Args, step: int, steps: int) -> float:
+    """Return the learning rate: a linear rise, then half a cosine down to 0."""
+    share = (step + 1) / steps
+    if share < _WARM:
+        return args.rate * share / _WARM
+    return args.rate * 0.5 * (1.0 + math.cos(math.pi * (share - _WARM) / (1.0 - _WARM)))
+
+
+def train(args: Args, samples: Samples, interruption: Interruption) -> UNet | None:
+    """Return a trained network, the moving average of its weights; None if Ctrl-C stopped that."""
+    torch.set_num_threads(args.threads)
+    torch.manual_seed(args.seed)
+    model = UNet()
+    model.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue] - twice as fast
+    optimiser = torch.optim.AdamW(model.parameters(), lr=args.rate, weight_decay=_DECAY)
+    average = model.named()
+    file, count = args.out / "training.safetensors", len(samples.truth)
+    begun = _resume(args, file, model, optimiser, average)
+    steps_each = math.ceil(count / args.batch)
+    for epoch in range(begun, args.epochs):
+        rng, total = np.random.default_rng([args.seed, epoch]), 0.0
+        order = rng.permutation(count)
+        for place in range(steps_each):
+            step = epoch * steps_each + place
+            for group in optimiser.param_groups:
+                group["lr"] = rate_at(args, step, args.epochs * steps_each)
+            cells, truth, asked = drawn_batch(
+                samples, order[place * args.batch : (place + 1) * args.batch], rng
+            )
+            loss = masked_loss(model(cells), truth, asked)
+            optimiser.zero_grad()
+            loss.backward()
+            optimiser.step()
+            total += loss.item()
+            kept = min(_AVERAGED, (1.0 + step) / (10.0 + step))
+            with torch.no_grad():
+                for name, values in model.state_dict().items():
+                    average[name].lerp_(values, 1.0 - kept)
+        if not math.isfinite(total):
+            raise SettingError(
+                "rate", args.rate, f"a rate at which the loss stays finite (epoch {epoch + 1})"
+            )
+        _save(args, file, epoch + 1, model, optimiser, average)
+        bits = total / steps_each / math.log(2.0)
+        _tell(args, f"epoch {epoch + 1} of {args.epochs}: {bits:.4f} bits a cell")
+        if interruption.asked and epoch + 1 < args.epochs:
+            return None
+    model.load_state_dict(average)
+    return model
+
+
+def _state(
+    model: UNet, optimiser: torch.optim.AdamW, average: dict[str, torch.Tensor]
+) -> dict[str, torch.Tensor]:
+    """Return all that learning goes on with, by name."""
+    tensors = {f"model.{name}": values for name, values in model.named().items()}
+    tensors |= {f"average.{name}": values for name, values in average.items()}
+    for number, state in optimiser.state_dict()["state"].items():
+        tensors |= {f"adam.{number}.{name}": values.contiguous().clone() for name, values in state.items()}
+    return tensors
+
+
+def _save(
+    args: Args,
+    file: Path,
+    epochs: int,
+    model: UNet,
+    optimiser: torch.optim.AdamW,
+    average: dict[str, torch.Tensor],
+) -> None:
+    """Write down how far learning is."""
+    about = {"epochs": str(epochs), "origin": _origin(args)}
+    write_atomically(file, save(_state(model, optimiser, average), about))
+
+
+def _origin(args: Args) -> str:
+    """Return the options that determine the weights, as JSON."""
+    return json.dumps({name: getattr(args, name) for name in _OPTIONS} | FEATURES)
+
+
+def _resume(
+    args: Args,
+    file: Path,
+    model: UNet,
+    optimiser: torch.optim.AdamW,
+    average: dict[str, torch.Tensor],
+) -> int:
+    """Take up what `_save` wrote, if anything; return how many epochs are done.
+
+    Raises:
+        SettingError: The file is of other options, or broken.
+    """
+    if not file.is_file():
+        return 0
+    try:
+        with safe_open(file, "pt") as opened:
+            about: dict[str, Any] = opened.metadata() or {}
+            tensors = {name: opened.get_tensor(name) for name in opened.keys()}
+    except (OSError, SafetensorError):
+        raise SettingError(
+            "out", str(file), "a file that this command wrote: remove it to begin anew"
+        ) from None
+    theirs = json.loads(about.get("origin", "{}"))
+    for name, value in json.loads(_origin(args)).items():
+        if theirs.get(name) != value:
+            allowed = f"{theirs.get(name)!r} as in the run in {args.out}, or another folder --out"
+            raise SettingError(name, value, allowed)
+    model.load_state_dict(_below("model.", tensors))
+    for name, values in _below("average.", tensors).items():
+        average[name].copy_(values)
+    state: dict[int, dict[str, torch.Tensor]] = {}
+    for name, values in _below("adam.", tensors).items():
+        number, _, what = name.partition(".")
+        state.setdefault(int(number), {})[what] = values
+    optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})
+    return int(about["epochs"])
+
+
+def _below(prefix: str, tensors: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+    """Return the tensors whose names begin with a prefix, by the rest of their names."""
+    return {name.removeprefix(prefix): each for name, each in tensors.items() if name.startswith(prefix)}
+
+
+def table_text(figures: dict[str, Any], left_out: str | None) -> str:
+    """Return the figures as a table."""
+    lines = [f"{'validation':<22}{'cells':>10}{'solid':>8}{'base':>8}{'nearest':>9}{'network':>9}{'ECE':>8}"]
+    for name, row in figures.items():
+        shown = f"{name} (left out)" if name == left_out else name
+        bits = f"{row['base_rate_bits']:>8.3f}{row['nearest_bits']:>9.3f}{row['predicted_bits']:>9.3f}"
+        lines.append(
+            f"{shown:<22}{row['cells']:>10,}{row['solid']:>8.3f}{bits}{row['calibration_error']:>8.4f}"
+        )
+    return "\n".join([*lines, "log loss in bits a cell; ECE = expected calibration error"])
+
+
+if __name__ == "__main__":
+    raise SystemExit(run_command(main))

@@ -1,0 +1,197 @@
+"""Samples for a predictor of maps: what a robot has measured around it, and what is there, cut from missions.
+
+Missions of today's strategies run in worlds of the splits train and validation; of the dungeons, those with
+odd numbers, the highest ten of which validate. Sensors, voxels, team sizes and the size of the workspace
+vary. From each mission some decisions are kept, drawn at random. A mission's samples are one file, and
+missions whose file is there are not run again.
+"""
+
+from __future__ import annotations
+
+import io
+import zlib
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from baselines.cli.interruption import Interruption
+from baselines.experiments.mission import run_mission, scripted_env
+from baselines.experiments.ray_cluster import RayCluster
+from baselines.experiments.worker_pool import Failure, run_each
+from baselines.strategies import make_strategy
+from baselines.suites.public_worlds import in_world
+from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from entropy_explore_env.errors import SettingError
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.prediction.crop import FREE, OUTSIDE, SOLID, around, pool_crop
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.settings.scenarios import SCENARIOS
+from entropy_explore_env.writing import write_atomically
+from training.checkpoints import stored_arrays, stored_bytes
+
+RECIPES = ("office", "corridor", "cluttered", "hybrid", "dungeon")
+"""What worlds are sampled from."""
+SPLITS = ("train", "validation")
+STRATEGIES = ("planned-rate", "nearest-frontier", "distance-advantage", "per-time-visibility")
+_DUNGEONS = {"train": range(1, 81, 2), "validation": range(81, 101, 2)}
+"""The dungeons of each split; those of even number are for tests."""
+_VOXELS_M = (0.1, 0.1, 0.2, 0.25)
+_SCALES = (1.0, 1.0, 1.4)
+"""Edges of workspaces relative to those of the named scenario."""
+_RANGES_M = (4.5, 8.0, 8.0)
+_RAYS_APART_RAD = np.pi / 180
+_TEAMS = (1, 1, 2, 3)
+_TIME_LIMIT_S = 3600.0
+_LEVELS = 252
+"""Steps in which shares of voxels are kept."""
+
+
+class Sampled(NamedTuple):
+    """A mission to be sampled."""
+
+    recipe: str
+    split: str
+    number: int  # of the mission within recipe and split
+    snapshots: int
+    seed: int  # of the run
+
+    @property
+    def name(self) -> str:
+        """What its file is called."""
+        return f"{self.split}-{self.recipe}-{self.number:04d}"
+
+    @property
+    def drawn_from(self) -> list[int]:
+        """What seeds its random numbers."""
+        return [self.seed, SPLITS.index(self.split), RECIPES.index(self.recipe), self.number]
+
+
+class Samples(NamedTuple):
+    """N samples of crops of C × C cells."""
+
+    cells: np.ndarray
+    """(N, 3, C, C) uint8, the channels of a crop in steps of 1/252."""
+    truth: np.ndarray
+    """(N, C, C) bool, which cells are solid."""
+
+
+def sampled_missions(
+    recipes: Sequence[str], split: str, missions: int, snapshots: int, seed: int
+) -> list[Sampled]:
+    """Return as many missions of a split in each recipe."""
+    return [Sampled(name, split, n, snapshots, seed) for n in range(missions) for name in recipes]
+
+
+def scenario_of(sampled: Sampled, rng: np.random.Generator) -> Scenario:
+    """Return the scenario of a mission, drawn by its recipe."""
+    changes: dict[str, Any] = {
+        "robots": int(rng.choice(_TEAMS)),
+        "split": sampled.split,
+        "sensor": {"max_range_m": float(rng.choice(_RANGES_M)), "angular_step_rad": _RAYS_APART_RAD},
+        "ending": {"time_limit_s": _TIME_LIMIT_S},
+    }
+    if rng.random() < 0.5:
+        changes["robot"] = {"redecide": "on_scan"}
+        changes["sensor"]["scan_every_m"] = 1.0
+    voxel_size_m, scale = float(rng.choice(_VOXELS_M)), float(rng.choice(_SCALES))
+    if sampled.recipe == "dungeon":
+        number = int(rng.choice(_DUNGEONS[sampled.split]))
+        changes["robot"] = {**changes.get("robot", {}), "body_radius_m": 0.0}
+        return with_settings(in_world(SCENARIOS["office"], f"dungeon-{number}"), changes)
+    named = SCENARIOS[sampled.recipe]
+    x, y = (max(round(edge * scale / voxel_size_m), 8) for edge in named.grid.size_m[:2])
+    changes["grid"] = {"shape": (x, y, 1), "voxel_size_m": voxel_size_m}
+    return with_settings(named, changes)
+
+
+def sample_mission(sampled: Sampled) -> bytes:
+    """Run a mission and return its samples, compressed."""
+    rng = np.random.default_rng(sampled.drawn_from)
+    env = scripted_env(scenario_of(sampled, rng))
+    strategy = make_strategy(STRATEGIES[int(rng.integers(len(STRATEGIES)))])
+    crops: list[np.ndarray] = []
+    truths: list[np.ndarray] = []
+
+    def note(env: EntropyExploreEnv) -> None:
+        deciding = env.deciding_agents() if env.agents else []
+        if deciding:
+            view = env.view(deciding[int(rng.integers(len(deciding)))])
+            cells, truth = crop_and_truth(env, view)
+            crops.append(np.rint(cells * _LEVELS).astype(np.uint8))
+            truths.append(truth)
+
+    run_mission(env, strategy, int(rng.integers(2**62)), after_step=note)
+    env.close()
+    kept = np.sort(rng.permutation(len(crops))[: sampled.snapshots])
+    arrays = {
+        "cells": np.stack([crops[n] for n in kept]),
+        "truth": np.packbits(np.stack([truths[n] for n in kept]), axis=-1),
+    }
+    return zlib.compress(stored_bytes(arrays))
+
+
+def crop_and_truth(env: EntropyExploreEnv, view: RobotView) -> tuple[np.ndarray, np.ndarray]:
+    """Return the channels (3, C, C) around a robot and which cells (C, C) are solid in its true world."""
+    world = env.missions.worlds[0]
+    assert world is not None
+    given = (view.scenario.sigma_prior, view.pose, view.kind.robot.body_radius_m)
+    cells = pool_crop(around(world.grid, view.mean, view.precision, *given))[0]
+    occupied, sure = world.occupied.astype(np.float32), np.full(world.grid.shape, 1e9, np.float32)
+    truth = pool_crop(around(world.grid, occupied, sure, *given))[0]
+    return cells, (truth[SOLID] > 0.0) | (truth[OUTSIDE] > 0.0)
+
+
+def make_samples(
+    missions: Sequence[Sampled], folder: Path, workers: int | RayCluster, interruption: Interruption
+) -> Iterator[Sampled]:
+    """Write the file of each mission that has none, and yield the mission; Ctrl-C ends it after one."""
+    missing = [each for each in missions if not file_of(folder, each).is_file()]
+    with closing(run_each(sample_mission, missing, workers)) as results:
+        for sampled, result in results:
+            if isinstance(result, Failure):
+                result.throw()
+            else:
+                write_atomically(file_of(folder, sampled), result)
+            yield sampled
+            if interruption.asked:
+                return
+
+
+def file_of(folder: Path, sampled: Sampled) -> Path:
+    """Return the file of a mission's samples."""
+    return folder / f"{sampled.name}.samples"
+
+
+def read_samples(folder: Path, missions: Iterable[Sampled]) -> tuple[Samples, np.ndarray]:
+    """Return the samples of missions, and the number (N,) in RECIPES of where each comes from.
+
+    Raises:
+        SettingError: A file is not what `make_samples` wrote.
+    """
+    cells, truths, recipes = [], [], []
+    for sampled in missions:
+        file = file_of(folder, sampled)
+        try:
+            arrays = stored_arrays(zlib.decompress(file.read_bytes()))
+            truth = np.unpackbits(arrays["truth"], axis=-1).astype(bool)
+        except (OSError, ValueError, KeyError, EOFError, zlib.error, io.UnsupportedOperation):
+            allowed = "samples that this command wrote: remove that file, and it is made again"
+            raise SettingError("out", str(file), allowed) from None
+        cells.append(arrays["cells"])
+        truths.append(truth)
+        recipes += [RECIPES.index(sampled.recipe)] * len(truth)
+    return Samples(np.concatenate(cells), np.concatenate(truths)), np.array(recipes)
+
+
+def unmeasured(cells: np.ndarray) -> np.ndarray:
+    """Return (N, C, C) bool, the cells of a workspace in which nothing was measured, from (N, 3, C, C)."""
+    return (cells[:, SOLID] == 0) & (cells[:, FREE] == 0) & (cells[:, OUTSIDE] == 0)
+
+
+def as_channels(cells: np.ndarray) -> np.ndarray:
+    """Return kept channels as the network reads them, float32."""
+    return cells.astype(np.float32) / np.float32(_LEVELS)
