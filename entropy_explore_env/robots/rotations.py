@@ -9,8 +9,6 @@ import math
 
 import numpy as np
 
-from entropy_explore_env.compilation.kernels import inlined_kernel
-
 
 def directions_of(yaw: float | np.ndarray, pitch: float | np.ndarray) -> np.ndarray:
     """Return the unit vectors (..., 3) of gazes, whose yaws and pitches are broadcast."""
@@ -72,17 +70,3 @@ def turned_by(poses: np.ndarray, yaw_rad: float) -> np.ndarray:
     if turned.shape[-1] == 5:
         turned[..., 3] = (poses[..., 3] + yaw_rad + math.pi) % (2.0 * math.pi) - math.pi
     return turned
-
-
-@inlined_kernel
-def dot(a, b):
-    """Return the scalar product of two vectors (x, y, z)."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@inlined_kernel
-def projection_on(vector, ahead, left):
-    """Return the projection (x, y, z) of a vector on the plane of two perpendicular unit vectors."""
-    along, across = dot(vector, ahead), dot(vector, left)
-    x, y = along * ahead[0] + across * left[0], along * ahead[1] + across * left[1]
-    return x, y, along * ahead[2] + across * left[2]

@@ -89,3 +89,17 @@ def _fill_candidates(precision, known_precision, position, radius, layer, candid
 def _span(position, reach, size):
     """Return the first and one past the last index along an axis whose voxel may be within reach."""
     return max(math.floor(position - reach), 0), min(math.floor(position + reach) + 1, size)
+
+
+@inlined_kernel
+def dot(a, b):
+    """Return the scalar product of two vectors (x, y, z)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined_kernel
+def projection_on(vector, ahead, left):
+    """Return the projection (x, y, z) of a vector on the plane of two perpendicular unit vectors."""
+    along, across = dot(vector, ahead), dot(vector, left)
+    x, y = along * ahead[0] + across * left[0], along * ahead[1] + across * left[1]
+    return x, y, along * ahead[2] + across * left[2]

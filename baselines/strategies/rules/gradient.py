@@ -18,8 +18,7 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.planner.driver import Driver, Trail
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.robots.motion import MoveEnd
-from entropy_explore_env.robots.rotations import dot, projection_on
-from entropy_explore_env.viewpoints.gradient_candidates import gradient_candidates
+from entropy_explore_env.viewpoints.gradient_candidates import dot, gradient_candidates, projection_on
 
 
 class GradientStrategy(Driver):
