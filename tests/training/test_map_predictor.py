@@ -15,6 +15,7 @@ from safetensors.torch import load_file
 from baselines.cli.interruption import Interruption
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED
 from entropy_explore_env.prediction.crop import CELLS, FREE, OUTSIDE, SOLID
+from entropy_explore_env.prediction.predictor import shipped_predictor
 from entropy_explore_env.prediction.weights import read_network
 from training import map_predictor, map_samples
 from training.map_predictor import Args, drawn_batch, main, masked_loss, rate_at, run_command
@@ -33,6 +34,7 @@ from training.map_scores import (
     log_loss_bits,
     nearest_bins,
     nearest_shares,
+    predictions,
     reliability,
     scored,
 )
@@ -148,6 +150,17 @@ def test_weights_are_scored_without_learning(whole, started, monkeypatch):
     assert run(started, f"--weights {whole / 'predictor.safetensors'}") == 0
     figures = [json.loads((folder / "predictor.json").read_text())["figures"] for folder in (whole, started)]
     assert figures[0] == figures[1]
+
+
+def test_the_shipped_weights_tell_rooms_from_rock_in_worlds_that_they_never_saw(whole):
+    """Of one mission each in a corridor and among clutter, drawn by another seed than any of training."""
+    validation = sampled_missions(RECIPES_HERE, "validation", 1, 3, 1)
+    samples, recipes = read_samples(whole / "samples", validation)
+    shipped = shipped_predictor().network
+    cells = scored(samples, recipes, predictions(shipped, samples), nearest_shares(samples))
+    figures = figures_of(cells)
+    for recipe in RECIPES_HERE:
+        assert figures[recipe]["predicted_bits"] < 0.8 * figures[recipe]["base_rate_bits"], recipe
 
 
 def test_a_recipe_that_is_left_out_is_told_of_and_not_learned(started, monkeypatch, capsys):
