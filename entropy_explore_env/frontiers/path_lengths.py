@@ -1,7 +1,8 @@
 """Lengths of paths through known free space, in voxel edges: from a robot, and on average from around it.
 
 A path leads from voxel centre to voxel centre through voxels in which the body may stand, with diagonal
-steps: the navigator's own paths before they are pulled straight, where nothing is unknown.
+steps: the navigator's own paths before they are pulled straight, where nothing is unknown. Lengths for drones
+in fine grids are those of steps between cells of several voxels (`cell_edge`).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from entropy_explore_env.belief.paths.lattice import Costs, Lattice, costs_of, new_lattice
 from entropy_explore_env.belief.paths.layer_lengths import fill_layer_lengths
 from entropy_explore_env.belief.paths.planning import resume_search, search_paths, start_search
-from entropy_explore_env.belief.paths.search import Search, extract_path, length_to
+from entropy_explore_env.belief.paths.search import Search, extract_path, length_to, new_search
 from entropy_explore_env.belief.paths.string_pulling import line_of_sight_cost, string_pulled
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
@@ -36,11 +37,10 @@ _FARTHER = 1.3
 class KnownPaths:
     """Shortest paths through the known free space of one robot's map.
 
-    Lengths are those of paths between cells of several voxels where `cell_edge` says so, in voxel edges; what
-    a robot drives along is found voxel by voxel.
+    Lines, and paths that a robot drives along, are always found voxel by voxel.
 
     Attributes:
-        search: Memory of the searches; one at a time, so that robots can share it.
+        search: Memory of the searches for lengths; one at a time, so that robots can share it.
         lattice: Steps between voxels.
         reach: How far the latest search of `start` goes: lengths up to this are final.
     """
@@ -51,6 +51,8 @@ class KnownPaths:
         shape, layer, edge = scenario.grid.shape, scenario.layer_of(kind.robot), cell_edge(scenario, kind)
         self.lattice = new_lattice(shape, 0.0, layer)
         self._coarse = self.lattice if edge == 1 else new_lattice(shape, 0.0, layer, edge)
+        self._by_voxels = search if edge == 1 else new_search(scenario.grid.voxels)
+        """Memory of what leads from voxel to voxel: paths that are driven along, and lines."""
         self.costs = costs_of(cells.traversal_cost, 1.0)
         self.reach, self._start = 0.0, NONE
 
@@ -60,6 +62,8 @@ class KnownPaths:
         self._start, indices = voxel, np.unravel_index(voxel, self._grid.shape)
         source = np.ravel_multi_index([n // self._coarse.edge for n in indices], self._coarse.size)
         start_search(self.search, self._coarse, self.costs, np.array([source], np.int32))
+        if self._coarse.edge > 1:  # lines are looked up in the map of today
+            start_search(self._by_voxels, self.lattice, self.costs, np.array([voxel], np.int32))
         self._search_within(max(_FIRST_REACH, 4.0 * self._cells.body_reach))
         self._cells.close(opened)
 
@@ -194,13 +198,14 @@ class KnownPaths:
     def is_line_free(self, first: np.ndarray, second: np.ndarray) -> bool:
         """Return whether the straight line between two places (3,), in voxel edges, is known to be free."""
         ends = [(float(p[0]), float(p[1]), float(p[2])) for p in (first, second)]
-        cost = line_of_sight_cost(self.search, self.lattice, self.costs, ends[0], ends[1])
+        cost = line_of_sight_cost(self._by_voxels, self.lattice, self.costs, ends[0], ends[1])
         return math.isfinite(cost)
 
     def free_lines(self, places: np.ndarray, farthest: float) -> np.ndarray:
         """Return (K, K) bool, pairs of (K, 3) places with a known free line up to `farthest` between them."""
         seen = np.zeros((len(places), len(places)), np.bool_)
-        fill_free_lines(self.search, self.lattice, self.costs, np.ascontiguousarray(places), farthest, seen)
+        lines = self._by_voxels, self.lattice, self.costs
+        fill_free_lines(*lines, np.ascontiguousarray(places), farthest, seen)
         return seen
 
     def route_to(self, goal: int) -> np.ndarray:
@@ -209,20 +214,25 @@ class KnownPaths:
 
     def _path_found(self, goal: int) -> np.ndarray:
         """Return (N,) int32 voxels of the path to a voxel by the latest search from voxel to voxel."""
-        path = np.empty(extract_path(self.search, self.lattice, goal, np.empty(0, np.int32)), np.int32)
-        extract_path(self.search, self.lattice, goal, path)
+        search, nothing = self._by_voxels, np.empty(0, np.int32)
+        path = np.empty(extract_path(search, self.lattice, goal, nothing), np.int32)
+        extract_path(search, self.lattice, goal, path)
         return path
 
     def path_to(self, start: int, goal: int) -> np.ndarray:
-        """Return (N,) int32 voxels of the shortest path between two voxels; N is 0 without one."""
+        """Return (N,) int32 voxels of the shortest path between two voxels; N is 0 without one.
+
+        What the latest search found is lost, where cells are voxels.
+        """
         opened = self._cells.open_start(start)
-        search_paths(self.search, self.lattice, self.costs, np.array([start], np.int32), goal, math.inf)
+        source = np.array([start], np.int32)
+        search_paths(self._by_voxels, self.lattice, self.costs, source, goal, math.inf)
         self._cells.close(opened)
         return self._path_found(goal)
 
     def corners_of(self, path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
         """Return (M, 3) points, grid units, where the latest path, pulled straight, turns; the goal last."""
-        return string_pulled(self.search, self.lattice, self.costs, path, start, goal)
+        return string_pulled(self._by_voxels, self.lattice, self.costs, path, start, goal)
 
 
 @lean_kernel

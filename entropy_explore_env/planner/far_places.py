@@ -149,8 +149,8 @@ def fill_blocks(belief, count, start, radius, blocks):
 def place_of(paths, blocks, i, j, k):
     """Return the voxel from which a block is looked at: see the top of this file; NOT_REACHED = none.
 
-    Where paths are searched in cells of several voxels, it is the voxel of the place's cell in which the body
-    stands.
+    Where paths are searched in cells of several voxels, it is the voxel in which the body stands in the cell
+    of the nearest one, if that is known to be free, too.
 
     Args:
         paths: FoundPaths from the robot.
@@ -159,7 +159,7 @@ def place_of(paths, blocks, i, j, k):
         j: Along y.
         k: Along z.
     """
-    size, layer = paths.lattice.grid, paths.lattice.layer
+    size, layer, edge = paths.lattice.grid, paths.lattice.layer, paths.lattice.edge
     low, high = _bounds(blocks, size, i, j, k)
     place, nearest = NOT_REACHED, math.inf
     for x in range(low[0], high[0]):
@@ -173,14 +173,15 @@ def place_of(paths, blocks, i, j, k):
                 voxel = flat_index(size, x, y, z)
                 if away >= nearest or not blocks.free[voxel] or (layer >= 0 and z != layer):
                     continue
-                if cost_to(paths.search, cell_of(paths.lattice, (x, y, z))) < math.inf:
+                if math.isinf(cost_to(paths.search, cell_of(paths.lattice, (x, y, z)))):
+                    continue
+                if edge > 1:
+                    cell = (x // edge, y // edge, z // edge)
+                    stand = standing_voxel(paths.lattice, paths.costs, cell)[1]
+                    voxel = flat_index(size, stand[0], stand[1], stand[2])
+                if blocks.free[voxel]:
                     nearest, place = away, voxel
-    if place == NOT_REACHED or paths.lattice.edge == 1:
-        return place
-    edge, (x, y, z) = paths.lattice.edge, grid_index(size, place)
-    x, y, z = standing_voxel(paths.lattice, paths.costs, (x // edge, y // edge, z // edge))[1]
-    place = flat_index(size, x, y, z)
-    return place if blocks.free[place] else NOT_REACHED
+    return place
 
 
 @lean_kernel

@@ -18,6 +18,7 @@ REFINED_SHIFT = 0.2
 """Standard deviation by which refined places differ along an axis, in reaches (tuned)."""
 PATHS_WITHIN = 1.6
 """Longest path to a place within reach, in reaches: around a corner or two (tuned)."""
+
 # Far places
 FIRST_RADIUS = 3.0
 """Length of the paths that are searched first, in reaches; then twice that, and so on (tuned, for time)."""

@@ -59,7 +59,7 @@ ESTIMATE = ranged_type(
     [
         ("place", "f8", PLACE, (3,)),  # where the robot truly was at the latest event
         ("yaw", "f8", ANGLE),  # its true yaw then
-        ("driven_m", "f8", Values(-1.0, MOST)),  # what it had driven by then
+        ("driven_m", "f8", Values(0.0, MOST)),  # what it had driven by then
         ("error", "f8", Values("error_low", "error_high"), (4,)),  # estimate less truth: x, y, z, yaw
         ("covariance", "f8", SPREAD, (4, 4)),  # of x, y, z, yaw, as the robot holds it to be
         # the covariance at its latest scan, as batches of measurements carry it

@@ -22,6 +22,8 @@ from entropy_explore_env.planner.far_places import (
     place_of,
     promised_around,
 )
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import random_belief
 
 SIZE, EDGE, TARGET = (7, 11, 5), 3, 400.0
@@ -102,3 +104,43 @@ def test_openings_promise_no_more_bits_than_remain():
     blocks.promised[0, 0], blocks.promised[2, 3] = 7.0, 90.0
     assert promised_around(blocks, 1, 1, 0) == 7.0
     assert promised_around(blocks, 2, 2, 0) == 60.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_places_in_cells_are_where_a_body_stands_on_known_ground(seed):
+    """A block has one if a free voxel of it is in a reached cell whose first fitting voxel is known."""
+    shape, edge, radius = (20, 17, 13), 2, 1.8
+    rng = np.random.default_rng(seed)
+    mean, precision = np.full(shape, 0.05, np.float32), np.full(shape, 100.0, np.float32)
+    mean[rng.random(shape) < 0.01] = 0.95
+    mean[:8, :8, :8] = 0.05
+    precision[rng.random(shape) < 0.02] = 1e-3
+    precision[12 + rng.integers(4) :] = 1e-3
+    belief, costs = (
+        Belief(mean.reshape(-1), precision.reshape(-1), shape),
+        belief_costs(mean, precision, 1e-3),
+    )
+    search, lattice = new_search(mean.size), new_lattice(shape, radius, None, edge)
+    source = int(np.ravel_multi_index((1, 1, 1), lattice.size))
+    search_paths(search, lattice, costs, np.array([source], np.int32), ANY_GOAL, math.inf)
+    blocks, paths = new_blocks(shape, 4), FoundPaths(search, lattice, costs)
+    fill_blocks(belief, BitCount(TARGET, 1.0, BEHIND), 0, 40, blocks)
+    fits = World(Grid(shape, 1.0), mean > 0.5, "drawn").collision_mask(radius) == 0
+    free, places = (mean <= 0.5) & (precision >= 1.0), 0
+    for index in itertools.product(*map(range, blocks.bits.shape)):
+        stands = set()
+        for voxel in itertools.product(
+            *(range(4 * n, min(4 * n + 4, m)) for n, m in zip(index, shape, strict=True))
+        ):
+            cell = tuple(n // edge for n in voxel)
+            if free[voxel] and math.isfinite(cost_to(search, int(np.ravel_multi_index(cell, lattice.size)))):
+                inside = itertools.product(
+                    *(range(edge * n, min(edge * n + edge, m)) for n, m in zip(cell, shape, strict=True))
+                )
+                stand = next(other for other in inside if fits[other])
+                if free[stand]:
+                    stands.add(int(np.ravel_multi_index(stand, shape)))
+        place = place_of(paths, blocks, *index)
+        assert place in stands if stands else place == NOT_REACHED
+        places += bool(stands)
+    assert 3 <= places < blocks.bits.size
