@@ -59,7 +59,7 @@ ALL_AROUND = Recipe(
 """Scanners that see all around: they choose places, not gazes."""
 
 MANY_RAYS = 2000
-"""Number of rays from which on scans of ALL_AROUND are thinned where viewpoints are drawn (for time)."""
+"""Number of rays from which on ALL_AROUND imagines one in two columns and rows where viewpoints are drawn."""
 
 NARROW_PLANNED = Recipe(
     exponent=1.0,
