@@ -22,7 +22,7 @@ _SHOWN_BYTES, _SPACE_BYTES, _LAYOUT_BYTES = 8, 10, 16
 """Of a number of an observation: in the missions and handed out, its bounds in a space, and in the layout."""
 _LAYER_BYTES = 10
 """Of a voxel of a world for each kind of robot: two masks, and the number of a start."""
-_SEARCH_BYTES, _PROPOSAL_BYTES = 21, 42
+_SEARCH_BYTES, _PROPOSAL_BYTES = 21, 43
 """Of a voxel in a thread's memory for paths, and for candidates, once searches have come there."""
 _PARTS = (
     ("pooled maps", "Observation.overview_shape", ("pooled",)),

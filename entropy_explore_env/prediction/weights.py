@@ -30,8 +30,8 @@ def read_network(file: Path) -> Network:
     """Read a file of weights.
 
     Raises:
-        SettingError: It cannot be read, is none or not whole, is of other cells, channels or layers, or holds
-            a number that is not finite.
+        SettingError: The file cannot be read, is truncated or of another format, was trained on other cells,
+            channels or layers, or holds a number that is not finite.
     """
     header, content = _header_and_content(file)
     _check_features(file, header.pop("__metadata__", None))

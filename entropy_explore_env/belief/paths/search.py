@@ -126,8 +126,8 @@ def cost_to(search, voxel):
 def length_to(search, lattice, costs, voxel):
     """Return the cost, in voxel edges, of the path to a voxel, at indices (x, y, z) of the grid; inf = none.
 
-    It is that of the voxel's cell; where cells are several voxels, there is none to a voxel in which the body
-    does not fit.
+    It is the cost of the path to the voxel's cell. Where cells are larger than voxels, voxels in which the
+    body does not fit are not reached.
     """
     cost = cost_to(search, cell_of(lattice, voxel))
     if lattice.edge == 1 or math.isinf(cost):
