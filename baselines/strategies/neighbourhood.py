@@ -283,5 +283,5 @@ class Neighbourhood:
             heard[place]["touching"] = touching_m / grid.voxel_size_m
             if mate.announced_s >= 0.0 and mate.depth_m > 0.0:
                 cones.append(announced_cone(grid, mate))
-        mark_cones(np.array(cones, CONE), grid.shape, self._marks, 1)
+        mark_cones(np.array(cones, CONE), grid.shape, self._marks)
         return heard

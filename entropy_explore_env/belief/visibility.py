@@ -119,12 +119,11 @@ def _span(cone, axis, size):
 
 
 @lean_kernel
-def mark_cones(cones, size, marks, mark):
-    """Give the voxels that are visible in any of (M,) CONE a mark (RochaMI, eqs. 5 and 8).
+def mark_cones(cones, size, marks):
+    """Mark the voxels that are visible in any of (M,) CONE (RochaMI, eqs. 5 and 8).
 
     Args:
-        marks: (V,) uint8.
-        mark: What the visible ones become, 0 … 255.
+        marks: (V,) uint8; those of visible voxels become 1.
     """
     for cone in cones:
         first_x, last_x = _span(cone, 0, size[0])
@@ -134,7 +133,7 @@ def mark_cones(cones, size, marks, mark):
                 first, last = _column_span(cone, i + 0.5 - cone.apex[0], j + 0.5 - cone.apex[1], size[2])
                 for k in range(first, last):
                     if _visible(cone, i, j, k):
-                        marks[np.uint32(flat_index(size, i, j, k))] = mark
+                        marks[np.uint32(flat_index(size, i, j, k))] = 1
 
 
 @lean_kernel

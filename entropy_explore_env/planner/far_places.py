@@ -164,12 +164,11 @@ def place_of(paths, blocks, i, j, k):
     place, nearest = NOT_REACHED, math.inf
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
+            level = (2 * x + 1 - low[0] - high[0]) ** 2 + (2 * y + 1 - low[1] - high[1]) ** 2
+            if level >= nearest:
+                continue
             for z in range(low[2], high[2]):
-                away = (
-                    (2 * x + 1 - low[0] - high[0]) ** 2
-                    + (2 * y + 1 - low[1] - high[1]) ** 2
-                    + (2 * z + 1 - low[2] - high[2]) ** 2
-                )
+                away = level + (2 * z + 1 - low[2] - high[2]) ** 2
                 voxel = flat_index(size, x, y, z)
                 if away >= nearest or not blocks.free[voxel] or (layer >= 0 and z != layer):
                     continue

@@ -146,7 +146,9 @@ def evaluate(proposer, situation, scan, options, far):
             option.seconds = travel_seconds(drive, edge_m, here, at, cost, reach)
         else:
             option.seconds = straight_seconds(belief, edge_m, drive, here, at, scratch.scan)
-        bits = expected_bits(belief, scan, at, scratch.scan)
+        bits = 0.0
+        if option.seconds < math.inf:
+            bits = expected_bits(belief, scan, at, scratch.scan)
         option.bits = option.stop_bits = worth_bits(proposer, situation, at, bits)
         option.value = value_of(situation, option.bits, option.seconds)
         moved = at[0] != here[0] or at[1] != here[1] or at[2] != here[2]

@@ -202,7 +202,7 @@ def propose(proposer, situation, candidates, described):
     """
     knowledge, experience, scratch = situation.knowledge, situation.experience, proposer.scratch
     belief, pool = situation.belief, scratch.pool
-    mark_cones(situation.cones, belief.size, scratch.scan.left, 1)
+    mark_cones(situation.cones, belief.size, scratch.scan.left)
     chosen = chosen_number(candidates, knowledge.target)
     came_bits = _came_bits(proposer, situation, candidates, chosen)
     learn(experience, candidates, knowledge, chosen, came_bits, proposer.drive.body_radius)
@@ -218,7 +218,8 @@ def propose(proposer, situation, candidates, described):
         if pool[choice].value <= KEEP_GOAL * pool[kept].value:
             choice = kept
     count = select(proposer, situation, size, choice, kept)
-    mark_cones(situation.cones, belief.size, scratch.scan.left, 0)
+    if len(situation.cones) > 0:
+        scratch.scan.left[:] = 0
     remaining = 0.0
     if described:
         remaining = fill_remaining(belief, proposer.target_precision, proposer.blocks)

@@ -64,11 +64,9 @@ def test_marks_are_the_voxels_whose_centres_lie_in_a_cone(seed, half_angle, radi
             np.array([*rng.uniform(-1.0, np.array(SIZE) + 1.0), *gaze]), radius, half_angle
         )
     marks = np.full(math.prod(SIZE), 7, np.uint8)
-    mark_cones(cones, SIZE, marks, 1)
+    mark_cones(cones, SIZE, marks)
     found = [inside(cones, x + 0.5, y + 0.5, z + 0.5) for x, y, z in np.ndindex(SIZE)]
     np.testing.assert_array_equal(marks, np.where(found, 1, 7))
-    mark_cones(cones, SIZE, marks, 7)
-    assert (marks == 7).all()
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -77,7 +75,7 @@ def test_a_cone_that_is_wide_around_the_vertical_by_hand(side):
     apex = (1.5, 5.5, 2.5, 0.0, -side * math.radians(50.0))
     cones = np.array([cone_of(np.array(apex), math.inf, math.radians(80.0))])
     marks = np.zeros(math.prod(SIZE), np.uint8)
-    mark_cones(cones, SIZE, marks, 1)
+    mark_cones(cones, SIZE, marks)
     columns = marks.reshape(SIZE)[:, 5]
     lowest = (2, 0, 0, -1, -1, -2, -2)  # above 1.2; the apex; above -0.6, -1.2, -1.7, -2.3 and -2.9
     for x, low in enumerate(lowest):
@@ -100,10 +98,10 @@ def covered(cones, belief, size=SIZE):
     mean, precision = belief[0].ravel(), belief[1].ravel()
     mine = np.array([cone_of(np.array([*c.apex, c.yaw, c.pitch]), c.radius, c.half_angle) for c in cones])
     marks = np.zeros(mean.size, np.uint8)
-    mark_cones(mine[1:], size, marks, 1)
+    mark_cones(mine[1:], size, marks)
     team = marked_bits(precision, marks)
     own, shared = visible_bits(mine[0], size, precision, KNOWN, marks)
-    mark_cones(mine[:1], size, marks, 1)
+    mark_cones(mine[:1], size, marks)
     return own, shared, team, marked_bits(precision, marks), marks
 
 

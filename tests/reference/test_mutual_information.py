@@ -42,7 +42,7 @@ def ours(belief, position, radius, cone, mates, weights, planar, ranked=None):
         if mate.cone is not None:
             c = mate.cone
             cone_of_mate = _cone(c.apex, c.yaw, c.pitch, c.radius, c.half_angle)
-            mark_cones(np.array([cone_of_mate], CONE), SIZE, marks, 1)
+            mark_cones(np.array([cone_of_mate], CONE), SIZE, marks)
     if len(candidates) == 0:
         return candidates, -1
     assert weights.interference == INTERFERENCE or not mates

@@ -60,7 +60,7 @@ def expected(mean, precision, viewpoint, scan, cones=NO_CONES):
         mean.size, longest_crossing(*SIZE, math.inf, scan.voxels_behind), len(scan.pitches)
     )
     belief = Belief(mean.ravel(), precision.ravel(), SIZE)
-    mark_cones(cones, SIZE, scratch.left, 1)
+    mark_cones(cones, SIZE, scratch.left)
     bits = expected_bits(belief, scan, np.array(viewpoint, float), scratch)
     assert not scratch.added.any()
     return bits
