@@ -12,10 +12,22 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.components import connected_components
+from entropy_explore_env.worlds.shafts import (
+    SINGLE,
+    box_order,
+    free_counts,
+    narrow_blocks,
+    new_blocks,
+    places_in_blocks,
+)
 from entropy_explore_env.worlds.world import Collision, World
 
 _BESIDE = 1.5
 """Voxel edges from what a body touches to the centre of the voxel beside it, diagonals included."""
+_NEAR = 8.0
+"""Distance, in voxel edges, up to which places are tried one by one; farther ones are ruled out in blocks."""
+_AT_ONCE = 4096
+"""Number of voxels that are looked at in one compiled call: signals are handled between calls."""
 _Starts = tuple[tuple[int, int, int], ...]
 """Voxels in which robots start."""
 
@@ -90,8 +102,7 @@ def _visible_to(world: World, scenario: Scenario, kind: RobotKind, starts: _Star
     left = np.argwhere(seen & ~reached)
     places = reached & ~np.asarray(ndimage.binary_erosion(reached), np.bool_)
     range_m = min(kind.sensor.max_range_m, float(np.linalg.norm(world.grid.size_m)))
-    found = np.zeros(len(left), np.bool_)
-    _look(left, places, free, _steps(range_m / world.grid.voxel_size_m, world.grid.shape), found)
+    found = _are_visible(left, places, free, range_m / world.grid.voxel_size_m)
     if found.all():
         return layout.visible
     seen[tuple(left[~found].T)] = False
@@ -100,6 +111,24 @@ def _visible_to(world: World, scenario: Scenario, kind: RobotKind, starts: _Star
     within = None if world.unreadable is None else ~world.unreadable
     behind = ndimage.binary_dilation(seen, iterations=kind.sensor.voxels_behind, mask=within)
     return layout.visible & (seen | (np.asarray(behind, np.bool_) & world.occupied))
+
+
+def _are_visible(voxels: np.ndarray, places: np.ndarray, free: np.ndarray, range_: float) -> np.ndarray:
+    """Return (N,) bool, which voxels (N, 3) are visible from some place, up to a range in voxel edges."""
+    found, steps = np.zeros(len(voxels), np.bool_), _steps(min(range_, _NEAR), free.shape)
+    for first in range(0, len(voxels), _AT_ONCE):
+        _look(voxels[first : first + _AT_ONCE], places, free, steps, found[first : first + _AT_ONCE])
+    hidden = np.flatnonzero(~found)
+    if range_ <= _NEAR or not len(hidden) or not places.any():
+        return found
+    hidden = hidden[box_order(voxels[hidden])]
+    far, from_places, counts = voxels[hidden], places_in_blocks(places), free_counts(free)
+    blocks, seen = new_blocks(from_places), np.zeros(len(hidden), np.bool_)
+    for first in range(0, len(hidden), _AT_ONCE):
+        last = min(first + _AT_ONCE, len(hidden))
+        _look_far(far, first, last, from_places, free, counts, range_**2 + 1e-9, blocks, seen)
+    found[hidden] = seen
+    return found
 
 
 @lru_cache(maxsize=8)
@@ -133,6 +162,37 @@ def _look(left, places, free, steps, found):
                 continue
             if places[x, y, z] and _is_open(free, voxel, step):
                 found[n] = True
+                break
+
+
+@lean_kernel
+def _look_far(voxels, first, last, places, free, counts, squared_range, blocks, found):
+    """Note which voxels can be seen from some of `Places`, however far away.
+
+    Args:
+        voxels: (N, 3) int64, in the order of `box_order`.
+        first: Number of the first one that is looked at; those before it have been.
+        last: One past the last one.
+        places: Places.
+        free: (X, Y, Z) bool.
+        counts: Of them: see `free_counts`.
+        squared_range: Square of the range, in voxel edges.
+        blocks: Blocks.
+        found: (N,) bool; filled.
+    """
+    for n in range(first, last):
+        voxel = voxels[n, 0], voxels[n, 1], voxels[n, 2]
+        narrow_blocks(counts, places, squared_range, voxels, n, blocks)
+        for number in range(blocks.count[SINGLE]):
+            block = blocks.left[SINGLE, number]
+            for m in range(places.first[block], places.first[block + 1]):
+                place = places.voxels[m]
+                step = place[0] - voxel[0], place[1] - voxel[1], place[2] - voxel[2]
+                squared = step[0] * step[0] + step[1] * step[1] + step[2] * step[2]
+                if squared <= squared_range and _is_open(free, voxel, step):
+                    found[n] = True
+                    break
+            if found[n]:
                 break
 
 

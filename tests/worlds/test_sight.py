@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from entropy_explore_env.missions.reset_options import ResetOptions
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import SCENARIOS
+from entropy_explore_env.worlds import sight
 from entropy_explore_env.worlds.given import in_given_worlds
-from entropy_explore_env.worlds.sight import _is_open, visible_from
+from entropy_explore_env.worlds.sight import _are_visible, _is_open, visible_from
 from entropy_explore_env.worlds.world import World
 
 EDGE_M = 0.1
@@ -97,3 +100,28 @@ def test_only_missions_that_end_by_it_count_so(ending, counted):
     expected = visible_from(world, scenario, LEFT) if counted else world.visible(scenario)
     assert missions.state.missions["visible"][0] == expected.sum()
     assert expected.sum() < world.visible(scenario).sum() or not counted
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10**6), st.sampled_from([(31, 22, 1), (19, 8, 11), (12, 26, 5)]), st.floats(3.0, 40.0))
+def test_places_that_are_ruled_out_by_blocks_see_nothing(seed, shape, range_):
+    """Rooms with holes in their walls, and clutter: as if every place were tried for every voxel."""
+    rng = np.random.default_rng(seed)
+    free = rng.random(shape) > rng.choice([0.0, 0.02, 0.2])
+    for axis in (0, 1):
+        wall = [slice(None)] * 3
+        wall[axis] = rng.integers(shape[axis])
+        free[tuple(wall)] = rng.random(shape)[tuple(wall)] < 0.05
+    places = free & (rng.random(shape) < 0.01)
+    places[shape[0] // 2 :] = False
+    voxels, at = np.argwhere(free & ~places), np.argwhere(places)
+    expected = [
+        any(
+            ((place - voxel) ** 2).sum() <= range_**2 and _is_open(free, tuple(voxel), tuple(place - voxel))
+            for place in at
+        )
+        for voxel in voxels
+    ]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sight, "_AT_ONCE", 100)
+        assert _are_visible(voxels, places, free, range_).tolist() == expected
