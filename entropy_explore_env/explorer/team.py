@@ -98,16 +98,17 @@ def view_of_seat(
         under_way=under_way,
         speed_m_s=0.0,
         since_scan_m=float(np.linalg.norm(pose[:3] - scan_pose[:3])) if under_way else 0.0,
-        pose=pose,
+        pose=read_only(pose),
+        covariance=read_only(np.zeros((4, 4))),
         mean=read_only(canvas.mean),
         precision=read_only(canvas.precision),
         entropy_bits=entropy_bits,
         move_end=move_end,
-        target=target.copy(),
-        path=target[None, :3].copy() if under_way else np.zeros((0, 3)),
+        target=read_only(target.copy()),
+        path=read_only(target[None, :3].copy() if under_way else np.zeros((0, 3))),
         depth_m=seat.depth_m,
         half_angle_rad=seat.half_angle_rad,
-        scan=ScanView(scan_pose.copy(), seat.ranges_m, seat.returned, seat.bits),
+        scan=ScanView(*map(read_only, (scan_pose.copy(), seat.ranges_m, seat.returned, seat.bits))),
         teammates={
             mate: teammate_view(told[mate], not other.here and bool(told[mate]["heard_s"] >= 0.0))
             for mate, other in enumerate(seats)
@@ -116,7 +117,7 @@ def view_of_seat(
         heard=read_only(told),
         gained_bits=seat.gained_bits,
         heard_bits=seat.heard_bits,
-        candidates=np.zeros((0, 5)),
+        candidates=read_only(np.zeros((0, 5))),
         ceiling=None,
         rules=workspace.rules,
     )

@@ -76,7 +76,8 @@ class ViewProposer:
         proposer = self._proposers[int(params[robot]["kind"])]
         known = proposer.scratch.knowledge[0]
         variances = float(np.trace(view.covariance[:3, :3])), float(view.covariance[3, 3])
-        locate(params[robot], view.pose, view.target, variances, view.entropy_bits, known)
+        pose, target = view.pose.copy(), view.target.copy()
+        locate(params[robot], pose, target, variances, view.entropy_bits, known)
         known["time_s"], known["came_bits"] = view.time_s, view.scan.utility_bits.sum()
         known["gained_bits"], known["heard_bits"] = view.gained_bits, view.heard_bits
         known["move_end"], known["under_way"] = view.move_end.code, view.under_way

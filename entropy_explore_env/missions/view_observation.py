@@ -79,7 +79,7 @@ class ViewObserver:
             view.entropy_bits,
             view.deciding,
             view.speed_m_s,
-            view.target,
+            view.target.copy(),
             view.heard.copy(),
             mean,
             precision,
@@ -125,5 +125,5 @@ class ViewObserver:
             self._rules.params[view.robot],
             int(action) if discrete else 0,
         )
-        decode_action(params, self._rules.actions, view.pose, continuous, number, viewpoint)
+        decode_action(params, self._rules.actions, view.pose.copy(), continuous, number, viewpoint)
         return viewpoint

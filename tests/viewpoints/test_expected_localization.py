@@ -176,7 +176,7 @@ def test_a_mission_then_does_what_was_foreseen(landmarks):
         np.empty((2, 4, 4)),
     )
     foreseen = view.covariance.copy()
-    foresee_covariance(foreseen, who, Drive(view.pose, goal[None, :3], goal, float(view.since_scan_m)))
+    foresee_covariance(foreseen, who, Drive(view.pose.copy(), goal[None, :3], goal, float(view.since_scan_m)))
     toward(missions, goal)
     found = view_of(missions, 0, 0)
     assert found.pose[:3] == pytest.approx(goal[:3], abs=0.3)

@@ -119,7 +119,7 @@ def localization_error(view: RobotKnowledge, paths: KnownPaths, pose: np.ndarray
         matrices=np.empty((2, 4, 4)),
     )
     since_m = view.since_scan_m if scan_every_m == sensor.scan_every_m else 0.0
-    drive = Drive(view.pose, path_points(view, paths, pose), pose, float(since_m))
+    drive = Drive(view.pose.copy(), path_points(view, paths, pose), pose, float(since_m))
     return float(growth_of_error(view.covariance, surveyor, drive, view.depth_m, np.empty((4, 4))))
 
 

@@ -53,7 +53,7 @@ class GradientStrategy(Driver):
         projected = view.planar if self._motion_plane is None else self._motion_plane
         position = grid.in_grid_units(view.pose)[:3]
         reach = min(robot.reach_m / grid.voxel_size_m, float(sum(grid.shape)))
-        chosen = steepest(view.mean, view.precision, position, view.pose[3:], reach, projected)
+        chosen = steepest(view.mean, view.precision, position, view.pose[3:].copy(), reach, projected)
         if chosen is None:
             return None
         place, gaze = chosen

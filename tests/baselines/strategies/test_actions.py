@@ -49,7 +49,12 @@ def acted(missions: Missions, strategy_name: str, steps: int):
             boxes[0, robot], numbers[0, robot] = (0.0, action) if discrete else (action, 0)
             meant = np.full(5, np.nan)
             decode_action(
-                rules.params[robot], rules.actions, view.pose, boxes[0, robot], numbers[0, robot], meant
+                rules.params[robot],
+                rules.actions,
+                view.pose.copy(),
+                boxes[0, robot],
+                numbers[0, robot],
+                meant,
             )
             yield view, viewpoint, meant
         missions.step(boxes, numbers)
