@@ -41,7 +41,7 @@ from baselines.cli.arguments import make_folder, parse, print_json, run_command
 from baselines.cli.interruption import Interruption
 from baselines.cli.worker_options import WorkerOptions
 from entropy_explore_env.command import INTERRUPTED
-from entropy_explore_env.errors import SettingError, one_of
+from entropy_explore_env.errors import SettingError, counted, one_of
 from entropy_explore_env.prediction.unet import LEVELS, layer_shapes
 from entropy_explore_env.prediction.weights import FEATURES, read_network
 from entropy_explore_env.settings.validation import check_whole
@@ -115,6 +115,8 @@ def main(words: Sequence[str]) -> int:
     network = None if args.weights is None else read_network(args.weights)
     workers = args.workers
     make_folder("out", args.out)
+    if network is None:
+        _taken_up(args)  # another run's options are refused before anything is sampled
     with Interruption(_STOPPED) as interruption:
         asked = {
             split: sampled_missions(args.recipes, split, count, args.snapshots, args.seed)
@@ -122,7 +124,7 @@ def main(words: Sequence[str]) -> int:
         }
         every, folder = [*asked["validation"], *asked["train"]], args.out / "samples"
         for done, _ in enumerate(make_samples(every, folder, workers, interruption)):
-            _tell(args, f"{done + 1} missions sampled", done % 20 == 0)
+            _tell(args, f"{counted(done + 1, 'mission')} sampled", done % 20 == 0)
         if interruption.asked:
             return _interrupted(args)
         learned = [each for each in asked["train"] if each.recipe != args.leave_out]
@@ -251,8 +253,8 @@ def train(args: Args, samples: Samples, interruption: Interruption) -> UNet | No
     model.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue] - twice as fast
     optimiser = torch.optim.AdamW(model.parameters(), lr=args.rate, weight_decay=_DECAY)
     average = model.named()
-    file, count = args.out / "training.safetensors", len(samples.truth)
-    begun = _resume(args, file, model, optimiser, average)
+    count = len(samples.truth)
+    begun = _resume(args, model, optimiser, average)
     steps_each = math.ceil(count / args.batch)
     for epoch in range(begun, args.epochs):
         rng, total = np.random.default_rng([args.seed, epoch]), 0.0
@@ -277,7 +279,7 @@ def train(args: Args, samples: Samples, interruption: Interruption) -> UNet | No
             raise SettingError(
                 "rate", args.rate, f"a rate at which the loss stays finite (epoch {epoch + 1})"
             )
-        _save(args, file, epoch + 1, model, optimiser, average)
+        _save(args, epoch + 1, model, optimiser, average)
         bits = total / steps_each / math.log(2.0)
         _tell(args, f"epoch {epoch + 1} of {args.epochs}: {bits:.4f} bits a cell")
         if interruption.asked and epoch + 1 < args.epochs:
@@ -299,7 +301,6 @@ def _state(
 
 def _save(
     args: Args,
-    file: Path,
     epochs: int,
     model: UNet,
     optimiser: torch.optim.AdamW,
@@ -307,7 +308,11 @@ def _save(
 ) -> None:
     """Write down how far learning is."""
     about = {"epochs": str(epochs), "origin": _origin(args)}
-    write_atomically(file, save(_state(model, optimiser, average), about))
+    write_atomically(_training_file(args), save(_state(model, optimiser, average), about))
+
+
+def _training_file(args: Args) -> Path:
+    return args.out / "training.safetensors"
 
 
 def _origin(args: Args) -> str:
@@ -315,20 +320,15 @@ def _origin(args: Args) -> str:
     return json.dumps({name: getattr(args, name) for name in _OPTIONS} | FEATURES)
 
 
-def _resume(
-    args: Args,
-    file: Path,
-    model: UNet,
-    optimiser: torch.optim.AdamW,
-    average: dict[str, torch.Tensor],
-) -> int:
-    """Take up what `_save` wrote, if anything; return how many epochs are done.
+def _taken_up(args: Args) -> tuple[int, dict[str, torch.Tensor]]:
+    """Return how many epochs are done and the tensors that `_save` wrote, if any.
 
     Raises:
         SettingError: The file is of other options, or broken.
     """
+    file = _training_file(args)
     if not file.is_file():
-        return 0
+        return 0, {}
     try:
         with safe_open(file, "pt") as opened:
             about: dict[str, Any] = opened.metadata() or {}
@@ -342,6 +342,14 @@ def _resume(
         if theirs.get(name) != value:
             allowed = f"{theirs.get(name)!r} as in the run in {args.out}, or another folder --out"
             raise SettingError(name, value, allowed)
+    return int(about["epochs"]), tensors
+
+
+def _resume(args: Args, model: UNet, optimiser: torch.optim.AdamW, average: dict[str, torch.Tensor]) -> int:
+    """Take up what `_save` wrote, if anything; return how many epochs are done."""
+    epochs, tensors = _taken_up(args)
+    if epochs == 0:
+        return 0
     model.load_state_dict(_below("model.", tensors))
     for name, values in _below("average.", tensors).items():
         average[name].copy_(values)
@@ -350,7 +358,7 @@ def _resume(
         number, _, what = name.partition(".")
         state.setdefault(int(number), {})[what] = values
     optimiser.load_state_dict({"state": state, "param_groups": optimiser.state_dict()["param_groups"]})
-    return int(about["epochs"])
+    return epochs
 
 
 def _below(prefix: str, tensors: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:

@@ -189,19 +189,29 @@ def test_options_out_of_range_are_refused_in_a_line(more, said, tmp_path, capsys
     assert said in error and error.count("\n") == 1 and not (tmp_path / "run").exists()
 
 
-def test_a_folder_of_another_run_and_broken_files_are_refused(whole, started, capsys):
+def test_a_folder_of_another_run_and_broken_files_are_refused(started, monkeypatch, capsys):
     assert run(started) == 0
-    assert run(started, "--rate 1e-3") == BAD_INPUT
-    assert "rate = 0.001: expected 0.002 as in the run in" in capsys.readouterr().err
-    (started / "training.safetensors").write_bytes(b"no tensors")
-    assert run(started) == BAD_INPUT
-    assert "remove it to begin anew" in capsys.readouterr().err
+    with monkeypatch.context() as patch:
+        patch.setattr(map_predictor, "make_samples", lambda *_: pytest.fail("sampled first"))
+        assert run(started, "--rate 1e-3") == BAD_INPUT
+        assert "rate = 0.001: expected 0.002 as in the run in" in capsys.readouterr().err
+        (started / "training.safetensors").write_bytes(b"no tensors")
+        assert run(started) == BAD_INPUT
+        assert "remove it to begin anew" in capsys.readouterr().err
+    (started / "training.safetensors").unlink()
     file = started / "samples" / f"{missions('train')[0].name}.samples"
     content = file.read_bytes()
     file.write_bytes(content[:-200])
     assert run(started) == BAD_INPUT
     file.write_bytes(content)
     assert "remove that file, and it is made again" in capsys.readouterr().err
+
+
+def test_missions_are_counted_as_they_are_sampled(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(map_predictor, "make_samples", lambda *_: iter([None]))
+    words = [*TINY.replace("--json", "").split(), "--out", str(tmp_path)]
+    assert run_command(main, words) == BAD_INPUT  # no file of samples is there
+    assert capsys.readouterr().err.startswith("1 mission sampled\n")
 
 
 def test_turns_and_mirrors_move_cells_and_truth_together():
