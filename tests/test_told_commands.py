@@ -82,6 +82,15 @@ def test_commands_of_a_page_can_be_typed(page):
     assert {shlex.join(words): found for words in commands if (found := faults(words))} == {}
 
 
+def test_commands_beside_a_target_are_those_of_the_makefile():
+    made = " ".join((ROOT / "Makefile").read_text("utf-8").split())
+    text = "".join(re.sub(r"\\\n\s*", " ", page.read_text("utf-8")) for page in PAGES)
+    beside = re.findall(r"^ {4}python -m ([^#\n]+?) +# [^\n]*make ([a-z]+)$", text, flags=re.MULTILINE)
+    assert {target for _, target in beside} >= {"policy", "predictor"}
+    for command, target in beside:
+        assert re.search(rf" {target}: [^:]*\$\(RUN\) {re.escape(' '.join(command.split()))} ", made), command
+
+
 def test_workflows_make_what_the_makefile_has():
     texts = [path.read_text("utf-8") for path in (ROOT / ".github").rglob("*.yml")]
     made = {
