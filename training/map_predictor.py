@@ -87,7 +87,7 @@ class Args(WorkerOptions):
     out: Path = Path("runs/map-predictor")
     """Folder of the run; the same command goes on with what is there."""
     weights: Path | None = None
-    """A file of weights to be scored; nothing is learned then."""
+    """A file of weights to be scored; nothing is learned then. Samples of a run in --out are used again."""
     missions: int = 250
     """Missions of training in each recipe."""
     validation_missions: int = 20
