@@ -32,6 +32,7 @@ from entropy_explore_env.explorer.goals import (
     Goal,
     NoGoal,
     Why,
+    check_decider,
     checked_pose,
     poses_by_number,
     purpose_of,
@@ -93,7 +94,7 @@ class Explorer:
             sensor: What they sense, in place of the scenario's.
             voxel_size_m: Edge of the maps' voxels, in place of the scenario's.
             robots: Number of robots; None = the scenario's, and 1 without one.
-            strategy: Chooses the viewpoints; None = `planned-rate`.
+            strategy: An object that chooses the viewpoints; None = `planned-rate`.
             weights: Weights of the planner's features, or the name of weights that come with the library,
                 "plans"; None = it has none.
             seed: Seed of all random draws.
@@ -104,6 +105,8 @@ class Explorer:
         """
         if strategy is not None and weights is not None:
             raise SettingError("weights", weights, "None where a strategy is given")
+        if strategy is not None:
+            check_decider(strategy)
         if not is_number(arrival_m) or not 0.0 <= arrival_m < math.inf:
             raise SettingError("arrival_m", arrival_m, "a finite number ≥ 0")
         self._task = task_of(scenario, robots, robot, sensor, voxel_size_m)

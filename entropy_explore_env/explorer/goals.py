@@ -79,6 +79,14 @@ class Decider(Protocol):
         ...
 
 
+def check_decider(strategy: object) -> None:
+    """Raise a SettingError unless a strategy is an object that can begin and choose."""
+    methods = {name for name in ("reset", "choose", "choose_all") if callable(getattr(strategy, name, None))}
+    if isinstance(strategy, type) or "reset" not in methods or len(methods) == 1:
+        made = f", such as baselines.strategies.make_strategy({strategy!r})" * isinstance(strategy, str)
+        raise SettingError("strategy", strategy, f"an object with reset and choose or choose_all{made}")
+
+
 def checked_pose(name: str, pose: object) -> np.ndarray:
     """Return a pose as an array.
 

@@ -349,6 +349,9 @@ def test_settings_are_checked_and_a_map_comes_first():
         ({"arrival_m": -1.0}, "arrival_m = -1.0"),
         ({"weights": "plans", "strategy": NearestFrontier()}, "None where a strategy is given"),
         ({"seed": -1}, "seed = -1"),
+        ({"strategy": "tour"}, r"strategy = 'tour': .*with reset and choose.*make_strategy\('tour'\)"),
+        ({"strategy": NearestFrontier}, "strategy = <class .*an object with reset and choose or choose_all$"),
+        ({"strategy": np.zeros(3)}, "strategy = .*an object with reset"),
     ]:
         with pytest.raises(SettingError, match=message):
             Explorer(**settings)
