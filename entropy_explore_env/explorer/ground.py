@@ -91,7 +91,8 @@ class Ground:
         """Let the canvas hold what is known of a map; return its first voxel (3,) in the canvas.
 
         Raises:
-            SettingError: Nothing is known of it, or it has other dimensions than the map before.
+            SettingError: Nothing is known of it, it lies too far from the map before, or it has other
+                dimensions.
         """
         shape, box, canvas = patch.shape, patch.box, self._canvas
         (x, y, yaw_rad), flat = patch.corner, shape[2] == 1
@@ -105,7 +106,15 @@ class Ground:
         low = canvas.offset_of(place) if canvas is not None and canvas.yaw_rad == yaw_rad else None
         if canvas is not None and low is not None:
             layers = max(canvas.grid.shape[2], int(low[2]) + shape[2])
-            return low - self._grow(canvas, (low + box[0], low + box[1]), layers)
+            try:
+                return low - self._grow(canvas, (low + box[0], low + box[1]), layers)
+            except SettingError:
+                if (np.abs(low) <= canvas.grid.shape).all():
+                    raise
+                above = np.abs(low).argmax() == 2
+                name, value = ("bottom_m", patch.bottom_m) if above else ("origin", patch.corner)
+                allowed = "a corner near enough for one grid to hold this map and what was known before"
+                raise SettingError(name, value, allowed) from None
         edge_m, (first, last) = self._task.grid.voxel_size_m, self._with_margin(box, shape[2], 2)
         grid = grid_of(last - first, edge_m, place + first * edge_m)
         self._begin(Canvas(grid, yaw_rad, self._prior), 0.0)

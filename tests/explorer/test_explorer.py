@@ -300,6 +300,10 @@ def bad_calls(explorer, seen):
         (lambda: explorer.set_map(wide), r"origin = None: .*no longer \(120, 80, 1\)"),
         (lambda: explorer.set_map(wide, origin=(0.0, 0.0, 0.0)), "grid = .*something is known"),
         (lambda: explorer.set_map(seen, origin=(0.0, np.inf, 0.0)), "origin = .*three finite numbers"),
+        (
+            lambda: explorer.set_map(seen, origin=(1e9, 0.0, 0.0)),
+            r"origin = \(1000000000.0, 0.0, 0.0\): .*near",
+        ),
         (lambda: explorer.set_map(seen.tolist()), r"grid = .*a NumPy array \(X, Y\)"),
         (lambda: explorer.set_map(seen + 4.5), "grid = .*probabilities from 0 to 1"),
         (lambda: explorer.set_map((seen > 50).astype(int)), "grid = .*booleans, or values='percent'"),
