@@ -24,21 +24,19 @@ from benchmarks.deciding import deciding_rows, mission_rows
 from benchmarks.fusion import fusion_rows
 from benchmarks.learning import learning_rows
 from benchmarks.peers import load_peers
-from benchmarks.planning import planning_rows
+from benchmarks.planning import voronoi_rows
 from benchmarks.rows import FULL, QUICK, Effort, Row
 from benchmarks.startup import startup_rows
 from benchmarks.stepping import size_rows, step_rows, vector_rows
-from benchmarks.summaries import summary_rows
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
 
 JOBS: dict[str, Callable[[Effort], list[Row]]] = {
-    "fusion beside octomap-python and the floor": fusion_rows,
+    "fusion beside octomap-python": fusion_rows,
     "ParallelEnv beside mpe2 simple_spread": step_rows,
     "VectorEnv beside the ParallelEnv, on one and two threads": vector_rows,
     "steps in worlds of different sizes": size_rows,
-    "summaries of maps": summary_rows,
-    "shortest paths beside SciPy": planning_rows,
+    "geodesic Voronoi cells beside SciPy": voronoi_rows,
     "decisions of strategies": deciding_rows,
     "a dense scanner, and a mission on a large floor": mission_rows,
     "learning": learning_rows,
