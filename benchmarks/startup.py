@@ -6,11 +6,12 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
 from typing import NamedTuple
 
 import entropy_explore_env
-from benchmarks.rows import Effort, Goal, Row, alone, timed
+from benchmarks.rows import Effort, Goal, Row, alone
 
 _FIRST_STEP = """
 import sys, time
@@ -42,11 +43,8 @@ def startup_rows(effort: Effort) -> list[Row]:
     warm = [first_step() for _ in range(effort.starts)]
     with tempfile.TemporaryDirectory() as empty:
         cold = [first_step(empty)]
-    rows = []
-    for starts, how, most_s in (
-        (warm, "compiled code cached, no torch", 1.5),
-        (cold, "nothing cached", 12.0),
-    ):
+    rows, kept = [], "compiled code cached, no torch"
+    for starts, how, most_s in ((warm, kept, 1.5), (cold, "nothing cached", 12.0)):
         whole, imports, steps = (list(column) for column in zip(*starts, strict=True))
         job = f"python start, import, reset, first step, {how}"
         rows += [
@@ -70,17 +68,12 @@ def first_step(cache: str | None = None) -> FirstStep:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
     if cache is not None:
         environment["NUMBA_CACHE_DIR"] = cache
-    done: list[subprocess.CompletedProcess[str]] = []
     words = [sys.executable, "-c", _FIRST_STEP]
-
-    def start() -> None:
-        done.append(
-            subprocess.run(
-                words, cwd=_OURS, env=environment, capture_output=True, text=True, timeout=_TIMEOUT_S
-            )
-        )
-
-    taken = timed(start).wall_s
-    if done[0].returncode != 0:
-        raise RuntimeError("the first step failed: " + done[0].stderr.strip().splitlines()[-1])
-    return FirstStep(taken, *map(float, done[0].stdout.split()))
+    began = time.perf_counter()
+    done = subprocess.run(
+        words, cwd=_OURS, env=environment, capture_output=True, text=True, timeout=_TIMEOUT_S
+    )
+    whole_s = time.perf_counter() - began
+    if done.returncode != 0:
+        raise RuntimeError("the first step failed: " + done.stderr.strip().splitlines()[-1])
+    return FirstStep(whole_s, *map(float, done.stdout.split()))

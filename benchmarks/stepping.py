@@ -7,9 +7,8 @@ utility worth sending is 0, so every scan sends a whole burst.
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Mapping
-from types import FrameType
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -65,6 +64,17 @@ def check_bursts(robots: np.ndarray, burst: int) -> None:
         raise RuntimeError(f"{sent} measurements sent in {scans} scans: the bursts of {burst} are not full")
 
 
+def warmed(advance: Callable[[Any], object], steps: Sequence[Any] | np.ndarray) -> Taken:
+    """Return what the steps take after the first few, which warm up."""
+
+    def take(some: Sequence[Any] | np.ndarray) -> None:
+        for step in some:
+            advance(step)
+
+    take(steps[:_WARMING_STEPS])
+    return timed(lambda: take(steps[_WARMING_STEPS:]))
+
+
 class Team:
     """ParallelEnvs of one scenario, stepped one after the other in a Python loop; mission e has seed e."""
 
@@ -79,19 +89,17 @@ class Team:
             actions: (steps, E, A, 5) float32.
             first_seed: Of the first mission.
         """
-        named = [[dict(zip(TURNING.agents, row, strict=True)) for row in step] for step in actions]
 
-        def advance(steps: list[list[dict[str, np.ndarray]]]) -> None:
-            for step in steps:
-                for env, action in zip(self.envs, step, strict=True):
-                    if not env.agents:
-                        env.reset()
-                    env.step(action)
+        def advance(step: list[dict[str, np.ndarray]]) -> None:
+            for env, action in zip(self.envs, step, strict=True):
+                if not env.agents:
+                    env.reset()
+                env.step(action)
 
         for seed, env in enumerate(self.envs, start=first_seed):
             env.reset(seed=seed)
-        advance(named[:_WARMING_STEPS])
-        taken = timed(lambda: advance(named[_WARMING_STEPS:]))
+        named = [[dict(zip(TURNING.agents, row, strict=True)) for row in step] for step in actions]
+        taken = warmed(advance, named)
         for env in self.envs:
             if not env.scenario.shares_summaries:
                 check_bursts(env.missions.state.robots, env.scenario.channel.burst)
@@ -103,51 +111,37 @@ class Batch:
 
     def __init__(self, missions: int, threads: int) -> None:
         """Make the environment."""
-        self.missions = missions
         self.env = EntropyExploreVectorEnv(ENDLESS, missions, threads=threads, autoreset_mode="SameStep")
 
     def run(self, actions: np.ndarray) -> Taken:
         """Return what the steps (steps, E, A, 5) take after a reset of all."""
-
-        def advance(steps: np.ndarray) -> None:
-            for action in steps:
-                self.env.step(action)
-
         self.env.reset(seed=0)
-        advance(actions[:_WARMING_STEPS])
-        taken = timed(lambda: advance(actions[_WARMING_STEPS:]))
+        taken = warmed(self.env.step, actions)
         check_bursts(self.env.missions.state.robots, ENDLESS.channel.burst)
         return taken
 
 
-def step_rates(scenarios: Mapping[str, Scenario], effort: Effort, peer: Spread | None) -> dict[str, list]:
-    """Return steps a second of one ParallelEnv of each scenario, and of the peer, round by round in turns."""
-    steps, jobs = effort.steps, dict[str, Job]()
-    for name, scenario in scenarios.items():
-        team = Team(scenario)
-        team.run(turns(1, 1, 0))
-        jobs[name] = lambda number, team=team: team.run(turns(steps, 1, number), number)
-    if peer is not None:
-        peer.run(_WARMING_STEPS)
-        jobs["peer"] = lambda _: timed(lambda: peer.run(steps))
-    taken = interleave(jobs, effort.rounds)
-    return {name: [steps / t.cpu_s for t in taken[name]] for name in taken}
-
-
 def step_rows(effort: Effort) -> list[Row]:
     """Return steps beside simple_spread, and with drift, fiducials and summaries beside without."""
-    robot = {"localization": _DRIFT}
+    robot, steps = {"localization": _DRIFT}, effort.steps
     scenarios = {
         "plain": TURNING,
         "drifting": with_settings(TURNING, {"robot": robot, "fiducials": {"number": 8}}),
         "summaries": with_settings(TURNING, {"channel": {"content": "summaries", "summary_every_s": 5.0}}),
     }
-    rates = step_rates(scenarios, effort, Spread(ROBOTS, seed=0))
+    teams, spread = {name: Team(scenario) for name, scenario in scenarios.items()}, Spread(ROBOTS, seed=0)
+    for team in teams.values():
+        team.run(turns(1, 1, 0))
+    spread.run(_WARMING_STEPS)
+    jobs: dict[str, Job] = {"spread": lambda _: timed(lambda: spread.run(steps))}
+    for name, team in teams.items():
+        jobs[name] = lambda number, team=team: team.run(turns(steps, 1, number), number)
+    taken = interleave(jobs, effort.rounds)
+    rates = {name: [steps / t.cpu_s for t in own] for name, own in taken.items()}
     job, unit = f"ParallelEnv.step, {ROBOTS} robots × {TURNING.sensor.rays} rays", "steps/s"
-    drifting = Goal("≥", 1.0 / 1.15)
-    plain, spread = rates["plain"], f"mpe2 simple_spread_v3, N = {ROBOTS}"
+    plain, peer, drifting = rates["plain"], f"mpe2 simple_spread_v3, N = {ROBOTS}", Goal("≥", 1.0 / 1.15)
     return [
-        compared(f"{job}, sharing in each step", spread, plain, rates["peer"], unit, Goal("≥", 2.0)),
+        compared(f"{job}, sharing in each step", peer, plain, rates["spread"], unit, Goal("≥", 2.0)),
         compared(f"{job} that drift, 8 fiducials", "exact robots", rates["drifting"], plain, unit, drifting),
         compared(f"{job}, a summary each 5 s", "batches", rates["summaries"], plain, unit),
     ]
@@ -155,11 +149,7 @@ def step_rows(effort: Effort) -> list[Row]:
 
 def vector_rows(effort: Effort) -> list[Row]:
     """Return rows of robot-steps a second: the VectorEnv beside ParallelEnvs, and two threads beside one."""
-    rows = [row for missions in effort.missions for row in batch_rows(missions, effort)]
-    many, few = Batch(max(effort.missions), 1), Batch(16, 1)
-    job, calls = f"Python calls in a VectorEnv.step, {many.missions} missions", Goal("=", 1.0)
-    rows.append(compared(job, "16 missions", [python_calls(many)], [python_calls(few)], "calls", calls))
-    return rows
+    return [row for missions in effort.missions for row in batch_rows(missions, effort)]
 
 
 def batch_rows(missions: int, effort: Effort) -> list[Row]:
@@ -198,25 +188,6 @@ def batch_rows(missions: int, effort: Effort) -> list[Row]:
     return rows
 
 
-def python_calls(batch: Batch, steps: int = 5) -> float:
-    """Return calls of Python and C functions in one step."""
-    actions = turns(steps, batch.missions, 0)
-    batch.run(actions)
-    count = 0
-
-    def note(frame: FrameType, event: str, argument: object) -> None:
-        nonlocal count
-        count += event in ("call", "c_call")
-
-    for action in actions[:steps]:
-        sys.setprofile(note)
-        try:
-            batch.env.step(action)
-        finally:
-            sys.setprofile(None)
-    return count / steps
-
-
 def size_rows(effort: Effort) -> list[Row]:
     """Return rows of microseconds a step in larger worlds beside the room: what rays cost, not the world.
 
@@ -243,9 +214,9 @@ def _walk(shape: tuple[int, int, int]) -> Job:
     boxes = np.random.default_rng(0).uniform(-1.0, 1.0, (_WALK_STEPS, 2, 5)).astype(np.float32)
     actions = [dict(zip(env.possible_agents, row, strict=True)) for row in boxes]
 
-    def advance() -> None:
+    def walk() -> None:
         for action in actions:
             env.step(action)
 
-    advance()  # touches the memory around the robots
-    return lambda _: timed(advance)
+    walk()  # touches the memory around the robots
+    return lambda _: timed(walk)
