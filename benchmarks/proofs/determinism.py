@@ -15,12 +15,10 @@ import sys
 from functools import cache
 
 import numpy as np
-from gymnasium import spaces
 
-from benchmarks.proofs.cases import BrokenPromiseError, Found
+from benchmarks.proofs.cases import BrokenPromiseError, Found, walk
 from benchmarks.proofs.drawn_scenarios import Drawn, draw_scenario
 from entropy_explore_env.errors import EntropyExploreError
-from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.state_digest import state_digest
 
@@ -82,13 +80,7 @@ def digest_of(number: int, threads: int, missions: int) -> str:
     drawn = next(drawn for draw in itertools.count() if (drawn := allowed(number, draw)) is not None)
     team = Missions(drawn.scenario, missions, threads, drawn.given)
     team.reset_some(range(missions), [number] * missions)
-    rng = np.random.default_rng(number)
-    axes, space = 5, action_space(drawn.scenario)
-    choices = int(space.n) if isinstance(space, spaces.Discrete) else 1
-    for _ in range(STEPS):
-        boxes = rng.uniform(-1.0, 1.0, (1, drawn.scenario.robots, axes)).astype(np.float32).astype(np.float64)
-        numbers = rng.integers(0, choices, (1, drawn.scenario.robots))
-        team.step(np.repeat(boxes, missions, axis=0), np.repeat(numbers, missions, axis=0))
+    walk(team, np.random.default_rng(number), STEPS, alike=True)
     return state_digest(team, 0)
 
 

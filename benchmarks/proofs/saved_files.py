@@ -37,7 +37,7 @@ class Saved(NamedTuple):
 
     Attributes:
         files: Name → sound content.
-        load: Reads those of a folder.
+        load: Reads those beside the first, from the path of that.
         repair: Makes the digests right again, where that is possible.
     """
 
@@ -165,9 +165,9 @@ def record_files(folder: Path) -> Saved:
     return Saved({"mission.npz": (folder / "mission.npz").read_bytes()}, _play_record, _with_checksum)
 
 
-def _play_record(folder: Path) -> object:
+def _play_record(path: Path) -> object:
     """Read a record, and start its mission."""
-    record = load_record(folder / "mission.npz")
+    record = load_record(path)
     env = EntropyExploreEnv(record.scenario, **given_worlds_of(record))
     env.reset(seed=record.seed, options=reset_options_of(record))
     return env
@@ -209,12 +209,12 @@ def checkpoint_files(folder: Path) -> Saved:
     return Saved(files, _load_checkpoint, _with_digests)
 
 
-def _load_checkpoint(folder: Path) -> object:
+def _load_checkpoint(path: Path) -> object:
     """Read a checkpoint, and make its policy."""
     from training.checkpoints import load_checkpoint
     from training.policy import load_policy
 
-    return load_policy(load_checkpoint(folder, training=True))
+    return load_policy(load_checkpoint(path.parent, training=True))
 
 
 def _with_digests(files: dict[str, bytes]) -> dict[str, bytes]:
