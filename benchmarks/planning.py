@@ -10,22 +10,12 @@ import numpy as np
 
 from baselines.papers.bhattacharya.measured import beside_scipy
 from benchmarks.rows import Effort, Goal, Row, compared
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 
-MAP = (1000, 783, 1)
-"""The cluttered map of Bhattacharya, 1000 × 783."""
+MAP = Grid((1000, 783, 1), 0.1)
+"""The cluttered map of Bhattacharya."""
 SOURCES = 4
-_MAP_SHARE = 0.25
-_EDGES = (4, 40)
-
-
-def cluttered(shape: tuple[int, int, int], share: float, seed: int = 0) -> np.ndarray:
-    """Return (X, Y, 1) bool, boxes of 4-39 cells over this share of the floor."""
-    rng, covered = np.random.default_rng(seed), np.zeros(shape, bool)
-    while covered.mean() < share:
-        x, y = rng.integers(0, shape[:2])
-        wide, deep = rng.integers(*_EDGES, 2)
-        covered[x : x + wide, y : y + deep] = True
-    return covered
 
 
 def maze(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
@@ -61,10 +51,11 @@ def traversal_costs(covered: np.ndarray) -> np.ndarray:
 
 def voronoi_rows(effort: Effort) -> list[Row]:
     """Return rows of Voronoi cells of four sources beside SciPy."""
+    rooms = RECIPES["bhattacharya-cluttered"](MAP, np.random.default_rng(0)).occupied
     maps = {
-        "boxes": traversal_costs(cluttered(MAP, _MAP_SHARE)),
-        "a maze": traversal_costs(maze(MAP)),
-        "white-noise costs": noise(MAP),
+        "rooms": traversal_costs(rooms),
+        "a maze": traversal_costs(maze(MAP.shape)),
+        "white-noise costs": noise(MAP.shape),
     }
     return [voronoi_row(name, costs, effort) for name, costs in maps.items()]
 

@@ -27,7 +27,7 @@ from benchmarks.peers import load_peers
 from benchmarks.planning import voronoi_rows
 from benchmarks.rows import FULL, QUICK, Effort, Row
 from benchmarks.startup import startup_rows
-from benchmarks.stepping import size_rows, step_rows, vector_rows
+from benchmarks.stepping import step_rows, vector_rows
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
 
@@ -35,10 +35,9 @@ JOBS: dict[str, Callable[[Effort], list[Row]]] = {
     "fusion beside octomap-python": fusion_rows,
     "ParallelEnv beside mpe2 simple_spread": step_rows,
     "VectorEnv beside the ParallelEnv, on one and two threads": vector_rows,
-    "steps in worlds of different sizes": size_rows,
     "geodesic Voronoi cells beside SciPy": voronoi_rows,
     "decisions of strategies": deciding_rows,
-    "a dense scanner, and a mission on a large floor": mission_rows,
+    "a dense scanner, and missions on a large floor": mission_rows,
     "learning": learning_rows,
     "first steps of fresh processes": startup_rows,
 }

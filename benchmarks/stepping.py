@@ -18,7 +18,6 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.ending import Ending
-from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import ROOM
 
@@ -27,8 +26,7 @@ TURNING = with_settings(
     ROOM, {"robots": ROBOTS, "decision_period_s": None, "channel": {"burst": 64, "i_min_bits": 0.0}}
 )
 """What `ParallelEnv.step` is measured on."""
-_NO_END = Ending(sigma_end=1e-3, time_limit_s=math.inf)
-ENDLESS = with_settings(TURNING, {"ending": _NO_END})
+ENDLESS = with_settings(TURNING, {"ending": Ending(sigma_end=1e-3, time_limit_s=math.inf)})
 """The same, but no mission ends while the clock runs."""
 LOOPED = 64
 """Missions of the batch that has goals, and that stands beside a Python loop."""
@@ -45,9 +43,6 @@ _DRIFT = {
     "yaw_rad_per_sqrt_m": 0.01,
     "yaw_rad_per_sqrt_rad": 0.01,
 }
-SHAPES = ((41, 41, 17), (200, 200, 25), (500, 500, 40), (1000, 1000, 100))
-"""Worlds of 2.9·10⁴, 10⁶, 10⁷ and 10⁸ voxels; the last takes 5 GiB."""
-_WALK_STEPS = 300
 
 
 def turns(steps: int, missions: int, seed: int) -> np.ndarray:
@@ -186,37 +181,3 @@ def batch_rows(missions: int, effort: Effort) -> list[Row]:
         doubled = Goal("≥", 1.7) if missions == LOOPED else None
         rows.append(compared(f"{job}, 2 threads", "1 thread", two, one, unit, doubled))
     return rows
-
-
-def size_rows(effort: Effort) -> list[Row]:
-    """Return rows of microseconds a step in larger worlds beside the room: what rays cost, not the world.
-
-    Two robots observe the pooled overview of their beliefs; their rays end after 2.5 m, so that they do the
-    same work in any world.
-    """
-    walks = {shape: _walk(shape) for shape in (SHAPES if effort.large else SHAPES[:3])}
-    taken = interleave({str(shape): walk for shape, walk in walks.items()}, effort.rounds)
-    step_us = {name: [1e6 * t.cpu_s / _WALK_STEPS for t in rounds] for name, rounds in taken.items()}
-    peer, room = f"{math.prod(SHAPES[0]):,} voxels", step_us[str(SHAPES[0])]
-    job, most = "ParallelEnv.step, 2 robots, overview on", Goal("≤", 1.5)
-    return [
-        compared(f"{job}, {math.prod(shape):.0e} voxels", peer, step_us[str(shape)], room, "µs", most)
-        for shape in list(walks)[1:]
-    ]
-
-
-def _walk(shape: tuple[int, int, int]) -> Job:
-    """Return steps in an empty world of some shape, with the same random actions in each round."""
-    settings = {"robots": 2, "decision_period_s": None, "sensor": {"max_range_m": 2.5}, "ending": _NO_END}
-    settings |= {"channel": {"i_min_bits": 0.0}, "observation": {"overview": True}}
-    env = EntropyExploreEnv(with_settings(ROOM, {**settings, "grid": Grid(shape, ROOM.grid.voxel_size_m)}))
-    env.reset(seed=0)
-    boxes = np.random.default_rng(0).uniform(-1.0, 1.0, (_WALK_STEPS, 2, 5)).astype(np.float32)
-    actions = [dict(zip(env.possible_agents, row, strict=True)) for row in boxes]
-
-    def walk() -> None:
-        for action in actions:
-            env.step(action)
-
-    walk()  # touches the memory around the robots
-    return lambda _: timed(walk)

@@ -8,7 +8,6 @@ from scipy.sparse.csgraph import dijkstra
 
 from baselines.papers.bhattacharya.measured import check_tessellation, cost_graph
 from benchmarks.planning import (
-    cluttered,
     maze,
     noise,
     traversal_costs,
@@ -23,7 +22,6 @@ TINY = Effort(rounds=2, long_rounds=1)
 def test_rows_are_measured():
     shape = (90, 61, 1)
     for name, rates in (
-        ("boxes", traversal_costs(cluttered(shape, 0.2))),
         ("a maze", traversal_costs(maze(shape))),
         ("noise", noise(shape)),
     ):
