@@ -13,12 +13,13 @@ import numpy as np
 
 from benchmarks.peers import OctoMapTree
 from benchmarks.rows import Effort, Goal, Row, compared, interleave, timed
-from entropy_explore_env.belief.map_update import PRIOR_MEAN, Scan, fuse_scan
-from entropy_explore_env.belief.measurement_model import Return
+from entropy_explore_env.belief.fields import Belief
+from entropy_explore_env.belief.map_update import PRIOR_MEAN, Scan
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.robots.measured_rays import trace_measurement
+from entropy_explore_env.robots.given_scans import aim_at_points, fuse_given
 from entropy_explore_env.robots.range_sensor import (
     Scene,
+    SensorModel,
     SensorPose,
     new_scan,
     sensor_model,
@@ -31,7 +32,6 @@ from entropy_explore_env.settings.sensor import RangeSensor
 FINE_GRID = Grid((103, 103, 43), 0.1, ROOM.grid.origin_m)
 """The room of 10.25 × 10.25 × 4.25 m in voxels of 0.1 m, rounded up."""
 
-_HIT = int(Return.HIT)
 _STEEPEST_RAD = math.pi / 4
 
 
@@ -63,50 +63,24 @@ def measure_room(grid: Grid, sensor: RangeSensor, scans: int, seed: int = 0) -> 
 
 
 @lean_kernel
-def fuse_measurements(
+def fuse_scans(
     scan: Scan,
-    params: np.void,
-    grid: tuple[tuple[int, int, int], float, np.ndarray],
-    positions_m: np.ndarray,
-    ends_m: np.ndarray,
-    mean: np.ndarray,
-    precision: np.ndarray,
-) -> int:
-    """Trace, weigh and fuse known measurements, with the library's own functions.
+    model: SensorModel,
+    scans: Measurements,
+    starts: np.ndarray,
+    edge_m: float,
+    ranges_m: np.ndarray,
+    belief: Belief,
+) -> None:
+    """Fuse the points of scans into a belief, with the library's own functions.
 
-    Args:
-        scan: Working space for R rays.
-        params: SENSOR_PARAMS.
-        grid: ((X, Y, Z) voxels, voxel edge in metres, (3,) origin in metres).
-        positions_m: (S, 3) float64.
-        ends_m: (S, R, 3) float64.
-        mean: (V,) float32, expected coverage; changed in place.
-        precision: (V,) float32, 1/σ²; changed in place.
-
-    Returns:
-        How many voxels the rays crossed.
+    The working space `scan` has R rays, as `ranges_m`, (R,) float64; `starts`, (S, 3) float64, are the
+    places of the scans in grid units.
     """
-    size, voxel_size_m, origin_m = grid
-    voxels = 0
-    for i in range(len(positions_m)):
-        here = positions_m[i]
-        start = (
-            (here[0] - origin_m[0]) / voxel_size_m,
-            (here[1] - origin_m[1]) / voxel_size_m,
-            (here[2] - origin_m[2]) / voxel_size_m,
-        )
-        for index in range(ends_m.shape[1]):
-            ray, end = scan.rays[index], ends_m[i, index]
-            x, y, z = end[0] - here[0], end[1] - here[1], end[2] - here[2]
-            range_m = math.sqrt(x * x + y * y + z * z)
-            ray.direction[0], ray.direction[1], ray.direction[2] = x / range_m, y / range_m, z / range_m
-            ray.length = range_m / voxel_size_m
-            ray.returned = _HIT
-            trace_measurement(scan, index, params, size, voxel_size_m, start, mean)
-            voxels += ray.voxels
-            scan.order[index] = index
-        fuse_scan(scan, ends_m.shape[1], mean, precision)
-    return voxels
+    for i in range(len(starts)):
+        frame = belief.size, edge_m, (starts[i, 0], starts[i, 1], starts[i, 2])
+        aim_at_points(scan.rays, scans.positions_m[i], scans.ends_m[i], ranges_m)
+        fuse_given(scan, model, frame, (0.0, 0.0), ranges_m, False, belief.mean, belief.precision)
 
 
 class Fusion:
@@ -114,19 +88,18 @@ class Fusion:
 
     def __init__(self, grid: Grid, sensor: RangeSensor, measurements: Measurements) -> None:
         """Start at the prior; one pass warms the map, the caches and the compiler."""
-        self._measurements = measurements
-        self._scan = new_scan(grid, [sensor], sensor.rays)
-        self.mean = np.full(grid.voxels, PRIOR_MEAN, np.float32)
-        self.precision = np.full(grid.voxels, ROOM.sigma_prior**-2, np.float32)
-        self._params = sensor_model(sensor).params[0]
-        self._grid = (grid.shape, grid.voxel_size_m, np.asarray(grid.origin_m, np.float64))
-        self.voxels = self.fuse()
+        mean, precision = np.full((2, grid.voxels), PRIOR_MEAN, np.float32)
+        precision[:] = ROOM.sigma_prior**-2
+        self.belief = Belief(mean, precision, grid.shape)
+        starts = (measurements.positions_m - grid.origin_m) / grid.voxel_size_m
+        scan, ranges_m = new_scan(grid, [sensor], sensor.rays), np.zeros(sensor.rays)
+        scans = measurements, starts, grid.voxel_size_m
+        self._given = scan, sensor_model(sensor), *scans, ranges_m, self.belief
+        self.fuse()
 
-    def fuse(self) -> int:
-        """Fuse the scans; returns how many voxels they crossed."""
-        return fuse_measurements(
-            self._scan, self._params, self._grid, *self._measurements, self.mean, self.precision
-        )
+    def fuse(self) -> None:
+        """Fuse the scans."""
+        fuse_scans(*self._given)
 
 
 def fusion_rows(effort: Effort) -> list[Row]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -21,74 +22,67 @@ PARTS = {"environment": "the environment", "choosing": "the policy's choices", "
 """Part of the loop that is timed → its words: stepping the missions, choosing, updating the networks."""
 
 
-class Loop:
-    """A run of `training.ppo` from fresh weights, a rollout at a time."""
+def loop(
+    threads: int, words: Sequence[str], folder: Path, stack: ExitStack
+) -> Callable[[], dict[str, float]]:
+    """Set up a run of `training.ppo` from fresh weights.
 
-    def __init__(self, threads: int, words: tuple[str, ...], folder: Path) -> None:
-        """Make it.
+    Args:
+        threads: For missions and networks.
+        words: Options of `training.ppo`.
+        folder: For what it writes.
+        stack: Ends its threads.
 
-        Args:
-            threads: For missions and networks.
-            words: Options of `training.ppo`.
-            folder: For what it writes.
+    Returns:
+        What does a rollout and the update after it, and returns its `steps`, `seconds`, and those of PARTS.
 
-        Raises:
-            MissingExtraError: PyTorch or Stable-Baselines3 is not installed.
-        """
-        try:
-            import torch
+    Raises:
+        MissingExtraError: PyTorch or Stable-Baselines3 is not installed.
+    """
+    try:
+        import torch
 
-            from training.ppo import parsed, set_up, training_task
-        except ModuleNotFoundError as error:
-            raise MissingExtraError(error.name or "torch", "training") from None
-        self._torch, self._threads = torch, threads
-        args = parsed(["--threads", str(threads), "--out", str(folder / f"run-{threads}"), *words])
-        self._state = set_up(args, training_task(args))
-        self._steps = args.rollout_steps * self._state.envs.num_envs
-        self._spent = dict.fromkeys(PARTS, 0.0)
-        model: Any = self._state.model
-        self._state.envs.step = self._timed("environment", self._state.envs.step)
-        model.choose = self._timed("choosing", model.choose)
-        model.train = self._timed("learning", model.train)
+        from training.ppo import parsed, set_up, training_task
+    except ModuleNotFoundError as error:
+        raise MissingExtraError(error.name or "torch", "training") from None
+    args = parsed(["--threads", str(threads), "--out", str(folder / f"run-{threads}"), *words])
+    state, spent = set_up(args, training_task(args)), dict[str, float]()
+    stack.callback(torch.set_num_threads, torch.get_num_threads())
+    stack.callback(state.envs.close)
+    steps, model = args.rollout_steps * state.envs.num_envs, state.model
 
-    def _timed(self, part: str, work: Callable[..., Any]) -> Any:  # noqa: ANN401 - what stands in for a method
-        def timed(*words: object) -> object:
+    def timed(part: str, work: Callable[..., Any]) -> Any:  # noqa: ANN401 - what stands in for a method
+        def work_in_time(*words: object) -> object:
             began = time.perf_counter()
             result = work(*words)
-            self._spent[part] += time.perf_counter() - began
+            spent[part] += time.perf_counter() - began
             return result
 
-        return timed
+        return work_in_time
 
-    def round(self) -> dict[str, float]:
-        """Return the `steps` of a rollout, its `seconds` with the update after it, and those of each part."""
-        self._spent = dict.fromkeys(PARTS, 0.0)
-        before = self._torch.get_num_threads()
-        self._torch.set_num_threads(self._threads)
+    def learn() -> dict[str, float]:
+        spent.update(dict.fromkeys(PARTS, 0.0))
+        torch.set_num_threads(threads)
         began = time.perf_counter()
-        try:
-            self._state.model.learn(self._steps, log_interval=2**31, reset_num_timesteps=False)
-        finally:
-            self._torch.set_num_threads(before)
-        return {"steps": self._steps, "seconds": time.perf_counter() - began, **self._spent}
+        model.learn(steps, log_interval=2**31, reset_num_timesteps=False)
+        return {"steps": steps, "seconds": time.perf_counter() - began, **spent}
 
-    def close(self) -> None:
-        """End its threads."""
-        self._state.envs.close()
+    state.envs.step = timed("environment", state.envs.step)
+    for part, method in (("choosing", "choose"), ("learning", "train")):
+        setattr(model, method, timed(part, getattr(model, method)))
+    return learn
 
 
 def learning_rounds(
     threads: Sequence[int], rounds: int, words: tuple[str, ...] = ()
 ) -> dict[int, list[dict[str, float]]]:
     """Learn on this many threads each, taking turns; a rollout of each before warms up."""
-    with tempfile.TemporaryDirectory() as folder:
-        loops = {count: Loop(count, words, Path(folder)) for count in threads}
-        found: dict[int, list[dict[str, float]]] = {count: [] for count in threads}
+    found: dict[int, list[dict[str, float]]] = {count: [] for count in threads}
+    with tempfile.TemporaryDirectory() as folder, ExitStack() as stack:
+        loops = {count: loop(count, words, Path(folder), stack) for count in threads}
         for _ in range(1 + rounds):
-            for count, loop in loops.items():
-                found[count].append(loop.round())
-        for loop in loops.values():
-            loop.close()
+            for count, learn in loops.items():
+                found[count].append(learn())
     return {count: own[1:] for count, own in found.items()}
 
 

@@ -8,7 +8,6 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import NamedTuple
 
 import entropy_explore_env
 from benchmarks.rows import Effort, Goal, Row, alone
@@ -29,14 +28,6 @@ _TIMEOUT_S = 300.0
 _OURS = Path(entropy_explore_env.__file__).parents[1]
 
 
-class FirstStep(NamedTuple):
-    """Seconds of a fresh process by the wall clock: in all, to import, to reset and step."""
-
-    whole_s: float
-    import_s: float
-    step_s: float
-
-
 def startup_rows(effort: Effort) -> list[Row]:
     """Import, reset and first step of `room`, interpreter start included: cached, and from nothing."""
     first_step()
@@ -55,8 +46,8 @@ def startup_rows(effort: Effort) -> list[Row]:
     return rows
 
 
-def first_step(cache: str | None = None) -> FirstStep:
-    """Time a fresh process from its start to the end of the first step.
+def first_step(cache: str | None = None) -> list[float]:
+    """Return seconds of a fresh process by the wall clock: from start to first step, to import, and to step.
 
     Args:
         cache: Folder of compiled code; None = the one that this process uses.
@@ -76,4 +67,4 @@ def first_step(cache: str | None = None) -> FirstStep:
     whole_s = time.perf_counter() - began
     if done.returncode != 0:
         raise RuntimeError("the first step failed: " + done.stderr.strip().splitlines()[-1])
-    return FirstStep(whole_s, *map(float, done.stdout.split()))
+    return [whole_s, *map(float, done.stdout.split())]

@@ -97,13 +97,11 @@ def read_saved(name: str, folder: Path, count: int, seed: int) -> Reads:
 
 
 def read_worlds(name: str, folder: Path, count: int, seed: int, reader: ReaderProcess | None = None) -> Reads:
-    """Change and read world files beside a file that must not be read; see `read_changed`.
+    """Change and read world files in an empty folder, beside a file that must not be read.
 
     Args:
         name: A format of SAMPLES.
-        folder: Empty.
-        count: Number of files.
-        seed: Of the changes.
+        folder, count, seed: See `read_changed`.
         reader: Process that reads them and goes on afterwards; None = a new one.
     """
     inside, sources = folder / "maps", SAMPLES[name]()

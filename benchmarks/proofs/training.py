@@ -66,14 +66,7 @@ def play(number: int) -> Found:
 
 
 def train(name: str, run: Path, words: tuple[str, ...], kills: int, moments: random.Random) -> int:
-    """Train in a folder, kill and resume the trainer, and check what it wrote; returns its robot-steps.
-
-    Args:
-        name: Of the trainer.
-        run: Folder of the run.
-        words: Options.
-        kills: Number of kills.
-        moments: Source of the moments.
+    """Train in a folder, kill and resume the trainer at drawn moments; returns the robot-steps.
 
     Raises:
         BrokenPromiseError: See play.
