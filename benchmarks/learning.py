@@ -21,10 +21,11 @@ THREADS = (1, 2)
 PARTS = {"environment": "the environment", "choosing": "the policy's choices", "learning": "learning"}
 """Part of the loop that is timed → its words: stepping the missions, choosing, updating the networks."""
 
+Rollout = Callable[[], dict[str, float]]
+"""Does a rollout and the update after it; returns its `steps`, `seconds`, and those of PARTS."""
 
-def loop(
-    threads: int, words: Sequence[str], folder: Path, stack: ExitStack
-) -> Callable[[], dict[str, float]]:
+
+def loop(threads: int, words: Sequence[str], folder: Path, stack: ExitStack) -> Rollout:
     """Set up a run of `training.ppo` from fresh weights.
 
     Args:
@@ -32,9 +33,6 @@ def loop(
         words: Options of `training.ppo`.
         folder: For what it writes.
         stack: Ends its threads.
-
-    Returns:
-        What does a rollout and the update after it, and returns its `steps`, `seconds`, and those of PARTS.
 
     Raises:
         MissingExtraError: PyTorch or Stable-Baselines3 is not installed.

@@ -97,12 +97,9 @@ def read_saved(name: str, folder: Path, count: int, seed: int) -> Reads:
 
 
 def read_worlds(name: str, folder: Path, count: int, seed: int, reader: ReaderProcess | None = None) -> Reads:
-    """Change and read world files in an empty folder, beside a file that must not be read.
+    """Change and read world files, in an empty folder beside a file that must not be read.
 
-    Args:
-        name: A format of SAMPLES.
-        folder, count, seed: See `read_changed`.
-        reader: Process that reads them and goes on afterwards; None = a new one.
+    See `read_changed`; a reader that is given goes on afterwards.
     """
     inside, sources = folder / "maps", SAMPLES[name]()
     (inside / "sub").mkdir(parents=True)
