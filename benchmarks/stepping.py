@@ -78,12 +78,7 @@ class Team:
         self.envs = [EntropyExploreEnv(scenario) for _ in range(missions)]
 
     def run(self, actions: np.ndarray, first_seed: int = 0) -> Taken:
-        """Return what the steps take after a reset of all; later resets are timed.
-
-        Args:
-            actions: (steps, E, A, 5) float32.
-            first_seed: Of the first mission.
-        """
+        """Return what the steps (steps, E, A, 5) take after a reset of all; later resets are timed."""
 
         def advance(step: list[dict[str, np.ndarray]]) -> None:
             for env, action in zip(self.envs, step, strict=True):

@@ -46,10 +46,7 @@ def play_cases(
 ) -> Iterator[tuple[int, Found | str]]:
     """Yield each case's number with what it found, or with one line on why it failed.
 
-    Args:
-        play: Plays the case of a number; a function at the top of a module.
-        numbers: Of the cases.
-        limit_s: Elapsed seconds that a case may take.
+    What plays a case is a function at the top of a module. A case may take `limit_s` on the clock.
     """
     for number, outcome in run_each(play, numbers, 1, limit_s, apart=True):
         if isinstance(outcome, Failure):
@@ -66,11 +63,7 @@ class Command(NamedTuple):
     python: str = sys.executable
 
     def kill_when(self, happened: Callable[[], bool], delay_s: float) -> None:
-        """Run it, and kill it with all its processes some time after something has happened.
-
-        Args:
-            happened: Whether it has; asked all the time.
-            delay_s: Seconds between that and the kill.
+        """Run it until something has happened and some seconds more, and kill it with all its processes.
 
         Raises:
             BrokenPromiseError: It ends before, or nothing happens for a quarter of an hour.
@@ -126,12 +119,7 @@ def walk(missions: Missions, rng: np.random.Generator, steps: int, alike: bool =
 
 
 def check_step(missions: Missions, rewards: Iterable[Any], said: str = "") -> None:
-    """Check what missions have observed and been given in a step.
-
-    Args:
-        missions: After the step.
-        rewards: Numbers or arrays.
-        said: What errors tell beside; empty = the scenario.
+    """Check what missions have observed and been given in a step; errors say the scenario, or what is given.
 
     Raises:
         BrokenPromiseError: An observation is outside its space, or a reward is not finite.

@@ -17,8 +17,7 @@ from functools import cache
 import numpy as np
 
 from benchmarks.proofs.cases import BrokenPromiseError, Found, walk
-from benchmarks.proofs.drawn_scenarios import Drawn, draw_scenario
-from entropy_explore_env.errors import EntropyExploreError
+from benchmarks.proofs.drawn_scenarios import first_allowed
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.state_digest import state_digest
 
@@ -77,18 +76,8 @@ def print_digests(first: int, threads: int, missions: int) -> None:
 
 def digest_of(number: int, threads: int, missions: int) -> str:
     """Return the digest of the first of some missions in a drawn scenario; the others are other episodes."""
-    drawn = next(drawn for draw in itertools.count() if (drawn := allowed(number, draw)) is not None)
+    drawn, _ = first_allowed(number, few_kernels=True)
     team = Missions(drawn.scenario, missions, threads, drawn.given)
     team.reset_some(range(missions), [number] * missions)
     walk(team, np.random.default_rng(number), STEPS, alike=True)
     return state_digest(team, 0)
-
-
-def allowed(number: int, draw: int) -> Drawn | None:
-    """Return a drawn scenario, if it is allowed and its first mission has room."""
-    try:
-        drawn = draw_scenario(np.random.default_rng([number, draw, 1]), few_kernels=True)
-        Missions(drawn.scenario, given=drawn.given).reset(0, number)
-    except EntropyExploreError:
-        return None
-    return drawn

@@ -8,6 +8,7 @@ default or some voxels long; and now and then any value, the ends of ranges amon
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Iterator
 from types import NoneType, UnionType
@@ -15,7 +16,8 @@ from typing import Any, Literal, NamedTuple, Union, get_args, get_origin
 
 import numpy as np
 
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import EntropyExploreError, SettingError
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.robot import Robot
@@ -53,6 +55,18 @@ class Drawn(NamedTuple):
 
     scenario: Scenario
     given: tuple[World, ...]
+
+
+def first_allowed(number: int, few_kernels: bool) -> tuple[Drawn, int]:
+    """Draw scenarios until one is allowed and its first mission has room; also return how many were not."""
+    for refused in itertools.count():
+        try:
+            drawn = draw_scenario(np.random.default_rng([number, refused]), few_kernels)
+            Missions(drawn.scenario, given=drawn.given).reset(0, number)
+        except EntropyExploreError:
+            continue
+        return drawn, refused
+    raise AssertionError("there are no more numbers")
 
 
 def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:

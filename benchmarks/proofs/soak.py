@@ -127,13 +127,7 @@ def check(
     before: tuple[np.ndarray, np.ndarray],
     now: tuple[np.ndarray, np.ndarray],
 ) -> None:
-    """Check a step against the moment before it.
-
-    Args:
-        env: After the step.
-        stepped: What the step returned.
-        before: Records of missions (E,) and robots (E, A) before the step.
-        now: The same after it.
+    """Check what a step returned, and the records of missions (E,) and robots (E, A) before and after it.
 
     Raises:
         BrokenPromiseError: A promise is broken.

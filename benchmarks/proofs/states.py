@@ -48,10 +48,7 @@ def play(number: int) -> Found:
 
 
 def change(number: int) -> tuple[str, str]:
-    """Change a number of a saved state, and go on from it.
-
-    Args:
-        number: Everything is drawn from it.
+    """Change a number of a saved state, and go on from it; everything is drawn from a number.
 
     Returns:
         `array.field[place] = value`, and the message of the error that refused it; empty = missions went on.
