@@ -13,41 +13,32 @@ import entropy_explore_env
 from benchmarks.rows import Effort, Goal, Row, alone
 
 _FIRST_STEP = """
-import sys, time
-began = time.perf_counter()
+import sys
 import entropy_explore_env
-imported = time.perf_counter()
 env = entropy_explore_env.parallel_env("room")
 env.reset(seed=0)
 env.step({agent: env.action_space(agent).sample() for agent in env.agents})
-stepped = time.perf_counter()
 assert "torch" not in sys.modules, "torch was imported"
-print(imported - began, stepped - imported)
 """
 _TIMEOUT_S = 300.0
 _OURS = Path(entropy_explore_env.__file__).parents[1]
 
 
 def startup_rows(effort: Effort) -> list[Row]:
-    """Import, reset and first step of `room`, interpreter start included: cached, and from nothing."""
+    """Return rows of a fresh process's seconds, interpreter start included: cached, and from nothing."""
     first_step()
     warm = [first_step() for _ in range(effort.starts)]
     with tempfile.TemporaryDirectory() as empty:
-        cold = [first_step(empty)]
-    rows, kept = [], "compiled code cached, no torch"
-    for starts, how, most_s in ((warm, kept, 1.5), (cold, "nothing cached", 12.0)):
-        whole, imports, steps = (list(column) for column in zip(*starts, strict=True))
-        job = f"python start, import, reset, first step, {how}"
-        rows += [
-            alone(job, whole, "s", Goal("≤", most_s, "s")),
-            alone(f"of that the import, {how}", imports, "s"),
-            alone(f"of that the first reset and step, {how}", steps, "s"),
-        ]
-    return rows
+        cold = first_step(empty)
+    job = "python start, import, reset, first step"
+    return [
+        alone(f"{job}, compiled code cached, no torch", warm, "s", Goal("≤", 1.5, "s")),
+        alone(f"{job}, nothing cached", [cold], "s", Goal("≤", 12.0, "s")),
+    ]
 
 
-def first_step(cache: str | None = None) -> list[float]:
-    """Return seconds of a fresh process by the wall clock: from start to first step, to import, and to step.
+def first_step(cache: str | None = None) -> float:
+    """Return the seconds by the wall clock from the start of a fresh process to the end of a first step.
 
     Args:
         cache: Folder of compiled code; None = the one that this process uses.
@@ -64,7 +55,7 @@ def first_step(cache: str | None = None) -> list[float]:
     done = subprocess.run(
         words, cwd=_OURS, env=environment, capture_output=True, text=True, timeout=_TIMEOUT_S
     )
-    whole_s = time.perf_counter() - began
+    taken_s = time.perf_counter() - began
     if done.returncode != 0:
         raise RuntimeError("the first step failed: " + done.stderr.strip().splitlines()[-1])
-    return [whole_s, *map(float, done.stdout.split())]
+    return taken_s

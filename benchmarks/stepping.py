@@ -37,12 +37,6 @@ _SINGLES = 8
 """Missions of the batch that the single environment takes on in a round."""
 _BATCH_STEPS = 10
 """Least steps of a batch in a round."""
-_DRIFT = {
-    "xy_m_per_sqrt_m": 0.02,
-    "z_m_per_sqrt_m": 0.01,
-    "yaw_rad_per_sqrt_m": 0.01,
-    "yaw_rad_per_sqrt_rad": 0.01,
-}
 
 
 def turns(steps: int, missions: int, seed: int) -> np.ndarray:
@@ -91,8 +85,7 @@ class Team:
         named = [[dict(zip(TURNING.agents, row, strict=True)) for row in step] for step in actions]
         taken = warmed(advance, named)
         for env in self.envs:
-            if not env.scenario.shares_summaries:
-                check_bursts(env.missions.state.robots, env.scenario.channel.burst)
+            check_bursts(env.missions.state.robots, env.scenario.channel.burst)
         return taken
 
 
@@ -112,29 +105,18 @@ class Batch:
 
 
 def step_rows(effort: Effort) -> list[Row]:
-    """Return steps beside simple_spread, and with drift, fiducials and summaries beside without."""
-    robot, steps = {"localization": _DRIFT}, effort.steps
-    scenarios = {
-        "plain": TURNING,
-        "drifting": with_settings(TURNING, {"robot": robot, "fiducials": {"number": 8}}),
-        "summaries": with_settings(TURNING, {"channel": {"content": "summaries", "summary_every_s": 5.0}}),
-    }
-    teams, spread = {name: Team(scenario) for name, scenario in scenarios.items()}, Spread(ROBOTS, seed=0)
-    for team in teams.values():
-        team.run(turns(1, 1, 0))
+    """Return the row of steps a second beside simple_spread."""
+    team, spread, steps = Team(TURNING), Spread(ROBOTS, seed=0), effort.steps
+    team.run(turns(1, 1, 0))
     spread.run(_WARMING_STEPS)
-    jobs: dict[str, Job] = {"spread": lambda _: timed(lambda: spread.run(steps))}
-    for name, team in teams.items():
-        jobs[name] = lambda number, team=team: team.run(turns(steps, 1, number), number)
+    jobs: dict[str, Job] = {
+        "ours": lambda number: team.run(turns(steps, 1, number), number),
+        "theirs": lambda _: timed(lambda: spread.run(steps)),
+    }
     taken = interleave(jobs, effort.rounds)
-    rates = {name: [steps / t.cpu_s for t in own] for name, own in taken.items()}
-    job, unit = f"ParallelEnv.step, {ROBOTS} robots × {TURNING.sensor.rays} rays", "steps/s"
-    plain, peer, drifting = rates["plain"], f"mpe2 simple_spread_v3, N = {ROBOTS}", Goal("≥", 1.0 / 1.15)
-    return [
-        compared(f"{job}, sharing in each step", peer, plain, rates["spread"], unit, Goal("≥", 2.0)),
-        compared(f"{job} that drift, 8 fiducials", "exact robots", rates["drifting"], plain, unit, drifting),
-        compared(f"{job}, a summary each 5 s", "batches", rates["summaries"], plain, unit),
-    ]
+    ours, theirs = ([steps / each.cpu_s for each in taken[name]] for name in jobs)
+    job = f"ParallelEnv.step, {ROBOTS} robots × {TURNING.sensor.rays} rays, sharing in each step"
+    return [compared(job, f"mpe2 simple_spread_v3, N = {ROBOTS}", ours, theirs, "steps/s", Goal("≥", 2.0))]
 
 
 def vector_rows(effort: Effort) -> list[Row]:

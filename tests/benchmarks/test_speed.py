@@ -144,10 +144,9 @@ def test_the_row_of_a_grid_is_measured():
 
 def test_steps_are_measured_with_full_bursts(monkeypatch):
     monkeypatch.setattr(stepping, "LOOPED", 2)
-    rows = stepping.step_rows(TINY)
-    assert [row.goal for row in rows] == ["≥ 2 ×", "≥ 0.869565 ×", None]
-    assert [row.peer for row in rows] == ["mpe2 simple_spread_v3, N = 4", "exact robots", "batches"]
-    assert all(row.ours > 0 and row.theirs for row in rows)
+    (row,) = stepping.step_rows(TINY)
+    assert row.goal == "≥ 2 ×" and row.peer == "mpe2 simple_spread_v3, N = 4"
+    assert row.ours > 0 and row.theirs
     rows = stepping.vector_rows(TINY)
     assert [row.goal for row in rows] == [None, "≥ 1.15 ×", "≥ 1.15 ×", "≥ 1.7 ×"]
     assert all(row.ours > 0 and row.theirs for row in rows)
@@ -167,8 +166,7 @@ def test_bursts_that_are_not_full_are_no_measurement():
 
 
 def test_first_step_of_a_fresh_process(monkeypatch):
-    whole_s, import_s, step_s = startup.first_step()
-    assert 0.0 < import_s < whole_s and 0.0 < step_s < whole_s - import_s
+    assert startup.first_step() > 0.0
     monkeypatch.setattr(startup, "_FIRST_STEP", "raise ValueError('no such room')")
     with pytest.raises(RuntimeError, match="no such room"):
         startup.first_step()
