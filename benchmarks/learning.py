@@ -1,4 +1,4 @@
-"""Learning: robot-steps of the whole PPO loop, of collecting alone, and what its time goes into.
+"""Learning: robot-steps of the whole PPO loop, and what its time goes into.
 
 `training.ppo` with its defaults in the room, 64 missions × 3 robots, from fresh weights: a robot-step is a
 step of one robot of one mission, whether or not the robot could choose. On one and two threads, by the wall
@@ -26,13 +26,7 @@ Rollout = Callable[[], dict[str, float]]
 
 
 def loop(threads: int, words: Sequence[str], folder: Path, stack: ExitStack) -> Rollout:
-    """Set up a run of `training.ppo` from fresh weights.
-
-    Args:
-        threads: For missions and networks.
-        words: Options of `training.ppo`.
-        folder: For what it writes.
-        stack: Ends its threads.
+    """Set up a run of `training.ppo` with options, from fresh weights; the stack ends its threads.
 
     Raises:
         MissingExtraError: PyTorch or Stable-Baselines3 is not installed.
@@ -85,22 +79,14 @@ def learning_rounds(
 
 
 def learning_rows(effort: Effort, words: tuple[str, ...] = ()) -> list[Row]:
-    """Return rows of robot-steps a second of the loop and of collecting, and the parts of the loop's time."""
+    """Return rows of robot-steps a second of the loop, and the parts of the loop's time."""
     found = learning_rounds(THREADS, 8 if effort.large else 2, words)
-    unit, rows, rates = "robot-steps/s", list[Row](), dict[int, list[float]]()
-    for job, collecting in (("PPO collecting", True), ("PPO", False)):
-        for threads, own in found.items():
-            rates[threads] = [
-                each["steps"] / (each["seconds"] - collecting * each["learning"]) for each in own
-            ]
-        job = f"{job}, 64 missions × 3 robots"
-        rows.append(alone(f"{job}, 1 thread", rates[1], unit))
-        rows.append(compared(f"{job}, 2 threads", "1 thread", rates[2], rates[1], unit))
-    rows.append(alone("PPO, 64 missions × 3 robots, 2 threads", rates[2], unit, Goal("≥", 12_000, unit)))
-    rest = [each["seconds"] - sum(each[part] for part in PARTS) for each in found[2]]
-    spent = {told: [each[part] for each in found[2]] for part, told in PARTS.items()}
-    for told, seconds in {**spent, "keeping the rollout": rest}.items():
-        shares = [100.0 * own / each["seconds"] for own, each in zip(seconds, found[2], strict=True)]
-        goal = Goal("≤", 50, "%") if told == PARTS["environment"] else None
-        rows.append(alone(f"of that {told}", shares, "%", goal))
-    return rows
+    one, two = ([each["steps"] / each["seconds"] for each in own] for own in found.values())
+    job, unit = "PPO, 64 missions × 3 robots, 2 threads", "robot-steps/s"
+    rows = [compared(job, "1 thread", two, one, unit), alone(job, two, unit, Goal("≥", 12_000, unit))]
+    shares = {
+        told: [100.0 * each[part] / each["seconds"] for each in found[2]] for part, told in PARTS.items()
+    }
+    shares["keeping the rollout"] = [100.0 - sum(each) for each in zip(*shares.values(), strict=True)]
+    goals = {PARTS["environment"]: Goal("≤", 50, "%")}
+    return rows + [alone(f"of that {told}", own, "%", goals.get(told)) for told, own in shares.items()]

@@ -43,7 +43,6 @@ JOBS: dict[str, Callable[[Effort], list[Row]]] = {
 }
 """Title → what is measured, in this order."""
 COLUMNS = ("job", "ours", "peer", "theirs", "ratio", "goal", "holds")
-_BUSY = 0.5
 _PACKAGES = "numpy numba octomap-python mpe2 pettingzoo gymnasium torch stable-baselines3".split()
 
 
@@ -66,8 +65,6 @@ def main(words: Sequence[str]) -> int:
     args = parse(Args, words, description=__doc__)
     jobs = checked(args)
     load_peers()
-    if hasattr(os, "getloadavg") and os.getloadavg()[0] > _BUSY:
-        print("warning: other work runs here, which makes two threads and starts look slow", file=sys.stderr)
     rows: list[Row] = []
     for number, (title, job) in enumerate(jobs.items(), start=1):
         print(f"[{number}/{len(jobs)}] {title} …", file=sys.stderr, flush=True)

@@ -119,11 +119,7 @@ def walk(missions: Missions, rng: np.random.Generator, steps: int, alike: bool =
 
 
 def check_step(missions: Missions, rewards: Iterable[Any], said: str = "") -> None:
-    """Check what missions have observed and been given in a step; errors say the scenario, or what is given.
-
-    Raises:
-        BrokenPromiseError: An observation is outside its space, or a reward is not finite.
-    """
+    """Raise a BrokenPromiseError if an observation is outside its space, or a reward is not finite."""
     layout, seen = missions.layout, missions.observations
     within = (seen >= layout.low.astype(np.float32)) & (seen <= layout.high.astype(np.float32))
     for place in np.argwhere(~within)[:1]:

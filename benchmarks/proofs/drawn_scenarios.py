@@ -8,7 +8,6 @@ default or some voxels long; and now and then any value, the ends of ranges amon
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Iterator
 from types import NoneType, UnionType
@@ -59,23 +58,18 @@ class Drawn(NamedTuple):
 
 def first_allowed(number: int, few_kernels: bool) -> tuple[Drawn, int]:
     """Draw scenarios until one is allowed and its first mission has room; also return how many were not."""
-    for refused in itertools.count():
+    refused = 0
+    while True:
         try:
             drawn = draw_scenario(np.random.default_rng([number, refused]), few_kernels)
             Missions(drawn.scenario, given=drawn.given).reset(0, number)
+            return drawn, refused
         except EntropyExploreError:
-            continue
-        return drawn, refused
-    raise AssertionError("there are no more numbers")
+            refused += 1
 
 
 def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:
-    """Draw all settings of a scenario.
-
-    Args:
-        rng: Where from.
-        few_kernels: Stay with the kernels of one of a few scenarios: others take seconds to compile.
-    """
+    """Draw all settings of a scenario, or with few kernels those that need no others: they compile slowly."""
     grid, given = _grid(rng), rng.random() < 0.3
     world = "empty" if given or rng.random() < 0.5 else str(rng.choice(sorted(RECIPES)))
     robot: dict[str, Any] = {

@@ -139,16 +139,10 @@ def read_changed(
     most_s: float,
     reader: ReaderProcess | None = None,
 ) -> Reads:
-    """Change files, load them, and note what is wrong with how each was treated.
+    """Change files, load them in a process or in this one, and note what is wrong with how they were treated.
 
-    Args:
-        change: Returns the change of a number by name, and the files with it.
-        load: Loads files from the path of the first.
-        folder: Where they are written.
-        count: Number of changes.
-        seed: Of the changes.
-        most_s: Most processor time for a file.
-        reader: Process that reads the files; None = this one.
+    `change` returns what is done to the files by name, and the files with it; `load` takes the path of the
+    first of them in the folder. Each may take `most_s` of the processor.
     """
     reads, there = Reads(), dict[str, bytes]()
     folder.mkdir(exist_ok=True)

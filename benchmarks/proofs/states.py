@@ -12,7 +12,6 @@ from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.reports.state_digest import state_digest
 from entropy_explore_env.settings.changes import with_settings
-from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import BOX
 
 STEPS = 20
@@ -30,11 +29,6 @@ SETTINGS: tuple[dict[str, Any], ...] = (
 """Settings of the missions whose states are changed: together they use every part of a state."""
 _NUMBERS = (np.nan, np.inf, -np.inf, -1.0, 0.0, 1.0, 1e9, -1e9, 1e300, 5e-324)
 _COUNTS = (-1, 0, 1, 2, 31, 32, 33, 1000, 10**8, 2**31, 2**62, -(2**62))
-
-
-def scenario_of(number: int) -> Scenario:
-    """Return the scenario of a change."""
-    return with_settings(with_settings(BOX, _BOX), SETTINGS[number % len(SETTINGS)])
 
 
 def play(number: int) -> Found:
@@ -57,7 +51,8 @@ def change(number: int) -> tuple[str, str]:
         BrokenPromiseError: The state was refused but missions changed, or missions that went on observed
             something outside their space.
     """
-    scenario, rng = scenario_of(number), np.random.default_rng([number, 7])
+    scenario = with_settings(with_settings(BOX, _BOX), SETTINGS[number % len(SETTINGS)])
+    rng = np.random.default_rng([number, 7])
     missions = Missions(scenario, 2)
     missions.reset_some([0, 1], [number, number + 1])
     walk(missions, rng, STEPS)

@@ -89,11 +89,7 @@ def train(name: str, run: Path, words: tuple[str, ...], kills: int, moments: ran
 
 
 def check_curve(curve: Path, column: str) -> int:
-    """Check that all figures of a run's validations are finite; returns its robot-steps.
-
-    Raises:
-        BrokenPromiseError: One is not.
-    """
+    """Return the robot-steps of a run; a BrokenPromiseError says which of its figures is not finite."""
     with curve.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     for row in rows:
@@ -104,11 +100,7 @@ def check_curve(curve: Path, column: str) -> int:
 
 
 def check_policy(run: Path) -> None:
-    """Check that all weights of the policy that a run keeps are finite.
-
-    Raises:
-        BrokenPromiseError: One is not.
-    """
+    """Raise a BrokenPromiseError unless all weights of the policy that a run keeps are finite."""
     from training.checkpoints import latest_checkpoint, load_checkpoint
 
     for weights, tensor in load_checkpoint(latest_checkpoint(run, "best")).weights.items():
