@@ -102,7 +102,7 @@ def run_mission(
     strategy: Strategy,
     seed: int,
     after_step: Callable[[EntropyExploreEnv], None] | None = None,
-    before_step: Callable[[Mapping[str, Any]], None] | None = None,
+    before_step: Callable[[Mapping[str, Any]], bool | None] | None = None,
     options: dict[str, Any] | None = None,
     backs_off: bool = True,
 ) -> None:
@@ -113,7 +113,7 @@ def run_mission(
         strategy: Chooses the viewpoints.
         seed: Of the mission.
         after_step: Called after the reset and after every step.
-        before_step: Called with the actions before every step.
+        before_step: Called with the actions before every step; where it returns True the mission is left.
         options: Of the reset: where the robots start, and in which world.
         backs_off: Whether robots that drift back off from what blocks them: see `planner.driver`.
     """
@@ -131,8 +131,8 @@ def run_mission(
         chosen = choose_all(strategy, views)
         for view, viewpoint in zip(views, chosen, strict=True):
             actions[env.agents[view.robot]] = view.action_for(viewpoint)
-        if before_step is not None:
-            before_step(actions)
+        if before_step is not None and before_step(actions):
+            return
         env.step(actions)
         if after_step is not None:
             after_step(env)
