@@ -170,11 +170,6 @@ def _idle_action(env: EntropyExploreEnv, agent: str) -> np.ndarray | np.int64:
 def mission_record(env: EntropyExploreEnv, strategy: str | Strategy, seed: int) -> Record:
     """Run a mission and record what reports need of it.
 
-    Args:
-        env: With any settings.
-        strategy: What chooses the viewpoints, or its name.
-        seed: Of the mission.
-
     Returns:
         The mission's figures; `half_s`, when the best map had lost half of H(0) - H_th; `sent_by_scan`,
         measurements sent after each of the team's scans; `apart_m`, the robots' mean distance from each
@@ -231,13 +226,7 @@ class SuiteMission:
         return None if self.start is None else {"starts": [self.start]}
 
     def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int, file: Path | None = None) -> Record:
-        """Run a mission and keep its figures, and what it cost on the clock.
-
-        Args:
-            env: With any settings.
-            strategy: Name of what chooses the viewpoints.
-            seed: Of the mission.
-            file: For the mission's record; None = it is not kept.
+        """Run a mission and keep its figures, what it cost on the clock, and its record if there is a file.
 
         Returns:
             `suite_figures`; and `clock`: `decision_ms` and `worst_decision_ms`, the time that the strategy
@@ -267,13 +256,9 @@ def replay_commands(
     after_step: Callable[[EntropyExploreEnv], None] | None = None,
     before_step: Callable[[Mapping[str, Any]], None] | None = None,
 ) -> int:
-    """Give an environment the commands of a record, until they or the mission end.
+    """Give an environment the commands of a record, until they or the mission end; see `run_mission`.
 
-    Args:
-        env: Just reset, as the record's mission was.
-        record: Whose commands.
-        after_step: Called after every step.
-        before_step: Called with the actions before every step.
+    The environment was just reset, as the record's mission was.
 
     Returns:
         How many commands were given.

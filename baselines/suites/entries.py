@@ -168,11 +168,7 @@ class Verdict(NamedTuple):
 
 
 def check_entry(folder: Path, workers: int | RayCluster) -> tuple[About, list[Verdict]]:
-    """Check every mission of an entry, and write down how many rows hold.
-
-    Args:
-        folder: The entry.
-        workers: Processes, or a cluster.
+    """Check every mission of the entry in a folder, and write down how many rows hold.
 
     Raises:
         SettingError: The folder is no entry that can be read.

@@ -70,11 +70,6 @@ def explore_until_done(
 ) -> tuple[Sequence[float], Sequence[float]]:
     """Run a mission until all robots find nothing unexplored, or it is cut off.
 
-    Args:
-        env: Of the mission.
-        explorer: The robots' strategy.
-        seed: Of the mission.
-
     Returns:
         Times and explored shares after the reset and each step.
     """
