@@ -56,7 +56,8 @@ def _digests(first: int, variant: tuple[str, int, int]) -> list[str]:
         variables |= {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
     if processor == "haswell":
         variables["NUMBA_CPU_FEATURES"] = "+avx2,+fma,+bmi,+bmi2"
-    code = f"from {__name__} import print_digests; print_digests({first}, {threads}, {missions})"
+    numbers = range(first, first + SCENARIOS_EACH)
+    code = f"from {__name__} import print_digests; print_digests({numbers}, {threads}, {missions})"
     words = [sys.executable, "-W", "ignore", "-c", code]
     done = subprocess.run(words, env=variables, capture_output=True, text=True, check=False)
     if done.returncode:
@@ -64,13 +65,12 @@ def _digests(first: int, variant: tuple[str, int, int]) -> list[str]:
     return json.loads(done.stdout)
 
 
-def print_digests(first: int, threads: int, missions: int) -> None:
+def print_digests(numbers: range, threads: int, missions: int) -> None:
     """Print the digests of some scenarios as JSON; processes with several missions are forked."""
     if missions > 1 and hasattr(os, "fork"):
         child = os.fork()
         if child:
             sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
-    numbers = range(first, first + SCENARIOS_EACH)
     print(json.dumps([digest_of(number, threads, missions) for number in numbers]))
 
 

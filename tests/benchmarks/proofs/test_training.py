@@ -31,7 +31,7 @@ def test_a_run_is_killed_resumed_and_ends(tmp_path, monkeypatch):
 
 @pytest.mark.long
 def test_a_run_that_ends_before_it_is_killed_is_told(tmp_path):
-    with pytest.raises(BrokenPromiseError, match=r"ended with 2 before a kill"):
+    with pytest.raises(BrokenPromiseError, match=r"ended with 2 before it was to be killed"):
         train("training.ppo", tmp_path / "run", ("--robots", "no"), 1, random.Random(0))
     with pytest.raises(BrokenPromiseError, match=r"training.ppo ended with 2: .*robots"):
         train("training.ppo", tmp_path / "run", ("--robots", "no"), 0, random.Random(0))
