@@ -81,12 +81,7 @@ def scripted_env(
     surroundings: Surroundings | None = None,
     **settings: Any,  # noqa: ANN401 - whatever a setting may be
 ) -> EntropyExploreEnv:
-    """Return an environment for scripted strategies.
-
-    Args:
-        scenario: The task.
-        surroundings: Of its missions; None = no others than the scenario says.
-        **settings: Fields of the scenario to change.
+    """Return an environment for scripted strategies, with some fields of the scenario changed.
 
     Raises:
         SettingError: A setting is not allowed.

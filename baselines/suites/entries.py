@@ -81,14 +81,9 @@ def record_file(folder: Path, cell: str, seed: int) -> Path:
 
 
 def write_entry(folder: Path, suite: Suite, quick: bool, author: str, how: How) -> bool:
-    """Run the missions of an entry that are missing, and write it.
+    """Run the missions that are missing in the folder of an entry, and write it.
 
-    Args:
-        folder: Of the entry; missions that are in it are not run again.
-        suite: With the strategies that are entered.
-        quick: Whether it is the quick form of the suite.
-        author: Who enters.
-        how: Where and how long.
+    The suite, whole or its quick form, has the strategies that are entered.
 
     Returns:
         Whether all missions were run; if not, the same call goes on.
