@@ -1,4 +1,4 @@
-"""The row of Voronoi cells is measured, and both sides find the same costs."""
+"""Rows of Voronoi cells are measured, and both sides find the same costs."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from entropy_explore_env.belief.paths.geodesic_cells import new_tessellation, te
 from entropy_explore_env.settings.grid import Grid
 
 
-def test_the_row_is_measured():
-    (voronoi,) = voronoi_rows(Effort(rounds=2, long_rounds=1), Grid((300, 240, 1), 0.1))
-    assert voronoi.unit == "maps/s" and voronoi.goal == "≥ 4.5 ×" and voronoi.ours > 0 and voronoi.theirs
+def test_the_rows_are_measured():
+    rows = voronoi_rows(Effort(rounds=2, long_rounds=1), Grid((300, 240, 1), 0.1))
+    assert len(rows) == 3
+    for row in rows:
+        assert row.unit == "maps/s" and row.goal == "≥ 4.5 ×" and row.ours > 0 and row.theirs
 
 
 def test_wrong_costs_and_cells_are_found():
