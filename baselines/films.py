@@ -17,9 +17,9 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from baselines.cli.arguments import make_folder, parse, run_command
+from baselines.cli.mission_outputs import film_moment
 from baselines.experiments.mission import run_mission, scripted_env
 from baselines.strategies import make_strategy, recommended
-from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.picture_text import shortened
 from entropy_explore_env.reports.animation import Film, animate
@@ -89,12 +89,9 @@ def main(words: Sequence[str]) -> int:
 
 
 def beside_each_other(films: Sequence[Film], names: Sequence[str], width: int) -> Iterator[np.ndarray]:
-    """Yield pictures (H, W, 3) uint8 of several missions on one clock, each under its name.
+    """Yield pictures (H, W, 3) uint8 of several missions on one clock, each under its name, width in pixels.
 
-    Args:
-        films: Of the missions; one that is over stands still.
-        names: What is written above each.
-        width: Of each mission's picture, in pixels.
+    The film of a mission that is over stands still.
     """
     longest = max(films, key=lambda film: film.times_s[-1])
     for time_s in [*longest.times_s, *[longest.times_s[-1]] * (_LAST - 1)]:
@@ -117,25 +114,10 @@ def _titled(picture: np.ndarray, title: str) -> np.ndarray:
 
 
 def filmed(scenario: Scenario, strategy: str, seed: int, pictures: int) -> Film:
-    """Return the film of a mission.
-
-    Args:
-        scenario: The task.
-        strategy: Name of the strategy.
-        seed: Of the mission.
-        pictures: Largest number, spread evenly.
-    """
+    """Return the film of a mission, of at most this many pictures, spread evenly."""
     painter, film = Painter("rgb_array"), Film(pictures)
-
-    def note(env: EntropyExploreEnv) -> None:
-        painter.watch(env.missions)
-        time_s = float(env.missions.state.missions[0]["time_s"])
-        if film.due(time_s) or not env.agents:
-            picture = painter.picture(env.missions)
-            assert picture is not None  # in this mode there is one
-            film.add(time_s, picture)
-
-    run_mission(scripted_env(scenario), make_strategy(strategy), seed, note)
+    env, made = scripted_env(scenario), make_strategy(strategy)
+    run_mission(env, made, seed, lambda env: film_moment(env, painter, [film]))
     return film
 
 

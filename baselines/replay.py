@@ -87,13 +87,12 @@ def _replayed(
     env.missions.seeds[0], env.missions.episodes[0] = record.seed, record.episode - 1
     env.reset(seed=None if record.episode else record.seed, options=reset_options_of(record))
     check_world(record, env.missions)
-    log.note(env)
-    show(env)
 
     def note(env: EntropyExploreEnv) -> None:
         log.note(env)
         show(env)
 
+    note(env)
     replay_commands(env, record, note, log.command)
     return env
 

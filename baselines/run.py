@@ -12,13 +12,12 @@ ends the mission after the step under way: what was done is shown and written, a
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from baselines.cli.arguments import parse, run_command
 from baselines.cli.interruption import Interruption
@@ -39,10 +38,6 @@ Learned: pretrained:room, the folder of a run of training, or a file of planner 
 Your own: my_package.my_module:MyStrategy, path/to/file.py:MyStrategy."""
 
 _PROMISE = "the mission ends after this step, and what was done is shown and written"
-
-
-class _MissionInterrupted(Exception):
-    """Ends a mission between two steps."""
 
 
 @dataclass
@@ -85,11 +80,14 @@ def main(words: Sequence[str]) -> int:
         def after_step(env: EntropyExploreEnv) -> None:
             log.note(env)
             show(env)
-            if interruption.asked and env.agents:
-                raise _MissionInterrupted
 
-        with Interruption(_PROMISE) as interruption, contextlib.suppress(_MissionInterrupted):
-            run_mission(env, strategy, args.seed, after_step, log.command)
+        def before_step(actions: Mapping[str, Any]) -> bool:
+            if not interruption.asked:
+                log.command(actions)
+            return interruption.asked
+
+        with Interruption(_PROMISE) as interruption:
+            run_mission(env, strategy, args.seed, after_step, before_step)
         figures, written = log.finish(name)
     if args.task.world and env.scenario.grid.flat and not task.scenario.grid.flat:
         plan = f"{args.task.world[0]} is one voxel high: robots stayed in its plane and looked level"

@@ -42,12 +42,7 @@ class OctoMapTree:
         self._tree = load_peer("octomap").OcTree(voxel_size_m)
 
     def insert(self, positions_m: np.ndarray, ends_m: np.ndarray) -> None:
-        """Insert scans exactly: every ray whole, inner nodes updated, end points not merged.
-
-        Args:
-            positions_m: (S, 3) float64, where each scan was taken.
-            ends_m: (S, R, 3) float64, what its rays hit.
-        """
+        """Insert scans, (S, 3) to (S, R, 3), exactly: rays whole, inner nodes updated, ends not merged."""
         for position, ends in zip(positions_m, ends_m, strict=True):
             self._tree.insertPointCloud(ends, position, maxrange=-1.0, lazy_eval=False, discretize=False)
 

@@ -1,117 +1,34 @@
-"""Shortest paths: geodesic Voronoi cells beside SciPy's Dijkstra, and plans across a large floor.
+"""Geodesic Voronoi cells beside SciPy's Dijkstra, in plans of Bhattacharya and in costs that are noise.
 
-Both sides get the same steps at the same costs. SciPy's graph is made before the clock starts; ours
-is the field of traversal costs, or the belief, itself.
+Both sides get the same steps at the same costs. SciPy's graph is made before the clock starts; ours is the
+field of traversal costs itself.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from baselines.papers.bhattacharya.measured import beside_scipy
-from benchmarks.rows import Effort, Goal, Row, alone, compared, timed
-from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
-from entropy_explore_env.belief.paths.planning import search_paths
-from entropy_explore_env.belief.paths.search import new_search
+from benchmarks.rows import Effort, Goal, Row, compared
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 
-MAP = (1000, 783, 1)
-"""The cluttered map of Bhattacharya, 1000 × 783."""
-FLOOR = (1674, 1006, 1)
-"""As many cells as the nav2 project's warehouse, of which 16 % are covered."""
+MAP = Grid((1000, 783, 1), 0.1)
 SOURCES = 4
-_MAP_SHARE, _FLOOR_SHARE = 0.25, 0.16
-_EDGES = (4, 40)
-_PRIOR, _KNOWN = 1e-3, 100.0
 
 
-def cluttered(shape: tuple[int, int, int], share: float, seed: int = 0) -> np.ndarray:
-    """Return (X, Y, 1) bool, boxes of 4-39 cells over this share of the floor."""
-    rng, covered = np.random.default_rng(seed), np.zeros(shape, bool)
-    while covered.mean() < share:
-        x, y = rng.integers(0, shape[:2])
-        wide, deep = rng.integers(*_EDGES, 2)
-        covered[x : x + wide, y : y + deep] = True
-    return covered
-
-
-def maze(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
-    """Return (X, Y, 1) bool, corridors one cell wide, one path between any two cells (a depth-first maze)."""
-    rng, covered = np.random.default_rng(seed), np.ones(shape, bool)
-    size, at = ((shape[0] - 1) // 2, (shape[1] - 1) // 2), (0, 0)
-    path, seen = [at], np.zeros(size, bool)
-    seen[at] = True
-    covered[1, 1] = False
-    while path:
-        x, y = path[-1]
-        around = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
-        fresh = [n for n in around if 0 <= n[0] < size[0] and 0 <= n[1] < size[1] and not seen[n]]
-        if not fresh:
-            path.pop()
-            continue
-        i, j = fresh[int(rng.integers(len(fresh)))]
-        seen[i, j] = True
-        covered[2 * i + 1, 2 * j + 1] = covered[x + i + 1, y + j + 1] = False
-        path.append((i, j))
-    return covered
-
-
-def noise(shape: tuple[int, int, int], seed: int = 0) -> np.ndarray:
-    """Return (X, Y, 1) float32, traversal costs drawn from 0.05 to 1 for each voxel by itself."""
-    return np.random.default_rng(seed).uniform(0.05, 1.0, shape).astype(np.float32)
-
-
-class Search:
-    """Our side: a search on a belief (X, Y, 1) that is sure of everything."""
-
-    def __init__(self, covered: np.ndarray, body_radius: float = 0.0) -> None:
-        """Make room."""
-        belief = covered.astype(np.float32), np.full(covered.shape, _KNOWN, np.float32)
-        self._lattice = new_lattice(covered.shape, body_radius)
-        self._search, self._costs = new_search(covered.size), belief_costs(*belief, _PRIOR)
-
-    def cost(self, start: int, goal: int) -> float:
-        """Return the cost of a path."""
-        sources = np.array([start], np.int32)
-        return search_paths(self._search, self._lattice, self._costs, sources, goal, math.inf)
-
-
-def planning_rows(effort: Effort) -> list[Row]:
-    """Return rows of Voronoi cells of four sources beside SciPy, and a plan across a floor."""
-    maps = {
-        "boxes": traversal_costs(cluttered(MAP, _MAP_SHARE)),
-        "a maze": traversal_costs(maze(MAP)),
-        "white-noise costs": noise(MAP),
-    }
-    rows = [voronoi_row(name, costs, effort) for name, costs in maps.items()]
-    return [*rows, crossing_row(FLOOR, effort)]
-
-
-def traversal_costs(covered: np.ndarray) -> np.ndarray:
-    """Return (X, Y, 1) float32, 1 where it is free, inf elsewhere."""
-    return np.where(covered, np.inf, 1.0).astype(np.float32)
-
-
-def voronoi_row(name: str, costs: np.ndarray, effort: Effort) -> Row:
+def voronoi_rows(effort: Effort, grid: Grid = MAP) -> list[Row]:
     """Return maps a second with the cells of SOURCES sources; SciPy gives the costs, and no cells."""
-    free, shape = np.flatnonzero(np.isfinite(costs)), costs.shape
-    sources = np.random.default_rng(1).choice(free, SOURCES, replace=False).astype(np.int32)
-    seconds = beside_scipy(costs, sources, effort.long_rounds)
-    job = f"geodesic Voronoi cells, {shape[0]} × {shape[1]}, {SOURCES} sources, {name}"
-    ours, theirs = ([1.0 / each_s for each_s in side] for side in seconds)
-    return compared(job, "SciPy dijkstra, min_only", ours, theirs, "maps/s", Goal("≥", 4.5))
-
-
-def crossing_row(shape: tuple[int, int, int], effort: Effort) -> Row:
-    """Return the row of milliseconds of a plan from corner to corner, for a body of 2½ cells."""
-    covered = cluttered(shape, _FLOOR_SHARE)
-    corner = 12
-    covered[:corner, :corner] = covered[-corner:, -corner:] = False
-    ours, place = Search(covered, 2.5), corner // 2
-    ends = place * shape[1] + place, (shape[0] - place) * shape[1] - place
-    if math.isinf(ours.cost(*ends)):
-        raise RuntimeError("there is no path across the floor")
-    taken = [timed(lambda: ours.cost(*ends)).cpu_s for _ in range(effort.rounds)]
-    job = f"plan across {shape[0]} × {shape[1]}, {_FLOOR_SHARE:.0%} covered, body of 2.5 cells"
-    return alone(job, [1e3 * cpu_s for cpu_s in taken], "ms", Goal("<", 50.0, "ms"))
+    rows, rng = [], np.random.default_rng(0)
+    for name in ("office", "cluttered", "white noise"):
+        if name == "white noise":
+            costs = rng.uniform(0.05, 1.0, grid.shape).astype(np.float32)
+        else:
+            solid = RECIPES[f"bhattacharya-{name}"](grid, rng).occupied
+            costs = np.where(solid, np.inf, 1.0).astype(np.float32)
+        sources = rng.choice(np.flatnonzero(np.isfinite(costs)), SOURCES, replace=False).astype(np.int32)
+        job = f"geodesic Voronoi cells, {name}, {grid.shape[0]} × {grid.shape[1]}, {SOURCES} sources"
+        seconds = beside_scipy(costs, sources, effort.long_rounds)
+        ours, theirs = ([1.0 / each_s for each_s in side] for side in seconds)
+        rows.append(compared(job, "SciPy dijkstra, min_only", ours, theirs, "maps/s", Goal("≥", 4.5)))
+    return rows

@@ -24,29 +24,25 @@ from benchmarks.deciding import deciding_rows, mission_rows
 from benchmarks.fusion import fusion_rows
 from benchmarks.learning import learning_rows
 from benchmarks.peers import load_peers
-from benchmarks.planning import planning_rows
+from benchmarks.planning import voronoi_rows
 from benchmarks.rows import FULL, QUICK, Effort, Row
 from benchmarks.startup import startup_rows
-from benchmarks.stepping import size_rows, step_rows, vector_rows
-from benchmarks.summaries import summary_rows
+from benchmarks.stepping import step_rows, vector_rows
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.writing import write_atomically
 
 JOBS: dict[str, Callable[[Effort], list[Row]]] = {
-    "fusion beside octomap-python and the floor": fusion_rows,
+    "fusion beside octomap-python": fusion_rows,
     "ParallelEnv beside mpe2 simple_spread": step_rows,
     "VectorEnv beside the ParallelEnv, on one and two threads": vector_rows,
-    "steps in worlds of different sizes": size_rows,
-    "summaries of maps": summary_rows,
-    "shortest paths beside SciPy": planning_rows,
+    "geodesic Voronoi cells beside SciPy": voronoi_rows,
     "decisions of strategies": deciding_rows,
-    "a dense scanner, and a mission on a large floor": mission_rows,
+    "a dense scanner, and missions on a large floor": mission_rows,
     "learning": learning_rows,
     "first steps of fresh processes": startup_rows,
 }
 """Title → what is measured, in this order."""
 COLUMNS = ("job", "ours", "peer", "theirs", "ratio", "goal", "holds")
-_BUSY = 0.5
 _PACKAGES = "numpy numba octomap-python mpe2 pettingzoo gymnasium torch stable-baselines3".split()
 
 
@@ -69,8 +65,6 @@ def main(words: Sequence[str]) -> int:
     args = parse(Args, words, description=__doc__)
     jobs = checked(args)
     load_peers()
-    if hasattr(os, "getloadavg") and os.getloadavg()[0] > _BUSY:
-        print("warning: other work runs here, which makes two threads and starts look slow", file=sys.stderr)
     rows: list[Row] = []
     for number, (title, job) in enumerate(jobs.items(), start=1):
         print(f"[{number}/{len(jobs)}] {title} …", file=sys.stderr, flush=True)

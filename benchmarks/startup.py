@@ -6,59 +6,39 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 from pathlib import Path
-from typing import NamedTuple
 
 import entropy_explore_env
-from benchmarks.rows import Effort, Goal, Row, alone, timed
+from benchmarks.rows import Effort, Goal, Row, alone
 
 _FIRST_STEP = """
-import sys, time
-began = time.perf_counter()
+import sys
 import entropy_explore_env
-imported = time.perf_counter()
 env = entropy_explore_env.parallel_env("room")
 env.reset(seed=0)
 env.step({agent: env.action_space(agent).sample() for agent in env.agents})
-stepped = time.perf_counter()
 assert "torch" not in sys.modules, "torch was imported"
-print(imported - began, stepped - imported)
 """
 _TIMEOUT_S = 300.0
 _OURS = Path(entropy_explore_env.__file__).parents[1]
 
 
-class FirstStep(NamedTuple):
-    """Seconds of a fresh process by the wall clock: in all, to import, to reset and step."""
-
-    whole_s: float
-    import_s: float
-    step_s: float
-
-
 def startup_rows(effort: Effort) -> list[Row]:
-    """Import, reset and first step of `room`, interpreter start included: cached, and from nothing."""
+    """Return rows of a fresh process's seconds, interpreter start included: cached, and from nothing."""
     first_step()
     warm = [first_step() for _ in range(effort.starts)]
     with tempfile.TemporaryDirectory() as empty:
-        cold = [first_step(empty)]
-    rows = []
-    for starts, how, most_s in (
-        (warm, "compiled code cached, no torch", 1.5),
-        (cold, "nothing cached", 12.0),
-    ):
-        whole, imports, steps = (list(column) for column in zip(*starts, strict=True))
-        job = f"python start, import, reset, first step, {how}"
-        rows += [
-            alone(job, whole, "s", Goal("≤", most_s, "s")),
-            alone(f"of that the import, {how}", imports, "s"),
-            alone(f"of that the first reset and step, {how}", steps, "s"),
-        ]
-    return rows
+        cold = first_step(empty)
+    job = "python start, import, reset, first step"
+    return [
+        alone(f"{job}, compiled code cached, no torch", warm, "s", Goal("≤", 1.5, "s")),
+        alone(f"{job}, nothing cached", [cold], "s", Goal("≤", 12.0, "s")),
+    ]
 
 
-def first_step(cache: str | None = None) -> FirstStep:
-    """Time a fresh process from its start to the end of the first step.
+def first_step(cache: str | None = None) -> float:
+    """Return the seconds by the wall clock from the start of a fresh process to the end of a first step.
 
     Args:
         cache: Folder of compiled code; None = the one that this process uses.
@@ -70,17 +50,12 @@ def first_step(cache: str | None = None) -> FirstStep:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
     if cache is not None:
         environment["NUMBA_CACHE_DIR"] = cache
-    done: list[subprocess.CompletedProcess[str]] = []
     words = [sys.executable, "-c", _FIRST_STEP]
-
-    def start() -> None:
-        done.append(
-            subprocess.run(
-                words, cwd=_OURS, env=environment, capture_output=True, text=True, timeout=_TIMEOUT_S
-            )
-        )
-
-    taken = timed(start).wall_s
-    if done[0].returncode != 0:
-        raise RuntimeError("the first step failed: " + done[0].stderr.strip().splitlines()[-1])
-    return FirstStep(taken, *map(float, done[0].stdout.split()))
+    began = time.perf_counter()
+    done = subprocess.run(
+        words, cwd=_OURS, env=environment, capture_output=True, text=True, timeout=_TIMEOUT_S
+    )
+    taken_s = time.perf_counter() - began
+    if done.returncode != 0:
+        raise RuntimeError("the first step failed: " + done.stderr.strip().splitlines()[-1])
+    return taken_s

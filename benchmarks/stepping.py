@@ -7,9 +7,8 @@ utility worth sending is 0, so every scan sends a whole burst.
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Mapping
-from types import FrameType
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,6 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.ending import Ending
-from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import ROOM
 
@@ -28,8 +26,7 @@ TURNING = with_settings(
     ROOM, {"robots": ROBOTS, "decision_period_s": None, "channel": {"burst": 64, "i_min_bits": 0.0}}
 )
 """What `ParallelEnv.step` is measured on."""
-_NO_END = Ending(sigma_end=1e-3, time_limit_s=math.inf)
-ENDLESS = with_settings(TURNING, {"ending": _NO_END})
+ENDLESS = with_settings(TURNING, {"ending": Ending(sigma_end=1e-3, time_limit_s=math.inf)})
 """The same, but no mission ends while the clock runs."""
 LOOPED = 64
 """Missions of the batch that has goals, and that stands beside a Python loop."""
@@ -40,15 +37,6 @@ _SINGLES = 8
 """Missions of the batch that the single environment takes on in a round."""
 _BATCH_STEPS = 10
 """Least steps of a batch in a round."""
-_DRIFT = {
-    "xy_m_per_sqrt_m": 0.02,
-    "z_m_per_sqrt_m": 0.01,
-    "yaw_rad_per_sqrt_m": 0.01,
-    "yaw_rad_per_sqrt_rad": 0.01,
-}
-SHAPES = ((41, 41, 17), (200, 200, 25), (500, 500, 40), (1000, 1000, 100))
-"""Worlds of 2.9·10⁴, 10⁶, 10⁷ and 10⁸ voxels; the last takes 5 GiB."""
-_WALK_STEPS = 300
 
 
 def turns(steps: int, missions: int, seed: int) -> np.ndarray:
@@ -65,6 +53,17 @@ def check_bursts(robots: np.ndarray, burst: int) -> None:
         raise RuntimeError(f"{sent} measurements sent in {scans} scans: the bursts of {burst} are not full")
 
 
+def warmed(advance: Callable[[Any], object], steps: Sequence[Any] | np.ndarray) -> Taken:
+    """Return what the steps take after the first few, which warm up."""
+
+    def take(some: Sequence[Any] | np.ndarray) -> None:
+        for step in some:
+            advance(step)
+
+    take(steps[:_WARMING_STEPS])
+    return timed(lambda: take(steps[_WARMING_STEPS:]))
+
+
 class Team:
     """ParallelEnvs of one scenario, stepped one after the other in a Python loop; mission e has seed e."""
 
@@ -73,28 +72,20 @@ class Team:
         self.envs = [EntropyExploreEnv(scenario) for _ in range(missions)]
 
     def run(self, actions: np.ndarray, first_seed: int = 0) -> Taken:
-        """Return what the steps take after a reset of all; later resets are timed.
+        """Return what the steps (steps, E, A, 5) take after a reset of all; later resets are timed."""
 
-        Args:
-            actions: (steps, E, A, 5) float32.
-            first_seed: Of the first mission.
-        """
-        named = [[dict(zip(TURNING.agents, row, strict=True)) for row in step] for step in actions]
-
-        def advance(steps: list[list[dict[str, np.ndarray]]]) -> None:
-            for step in steps:
-                for env, action in zip(self.envs, step, strict=True):
-                    if not env.agents:
-                        env.reset()
-                    env.step(action)
+        def advance(step: list[dict[str, np.ndarray]]) -> None:
+            for env, action in zip(self.envs, step, strict=True):
+                if not env.agents:
+                    env.reset()
+                env.step(action)
 
         for seed, env in enumerate(self.envs, start=first_seed):
             env.reset(seed=seed)
-        advance(named[:_WARMING_STEPS])
-        taken = timed(lambda: advance(named[_WARMING_STEPS:]))
+        named = [[dict(zip(TURNING.agents, row, strict=True)) for row in step] for step in actions]
+        taken = warmed(advance, named)
         for env in self.envs:
-            if not env.scenario.shares_summaries:
-                check_bursts(env.missions.state.robots, env.scenario.channel.burst)
+            check_bursts(env.missions.state.robots, env.scenario.channel.burst)
         return taken
 
 
@@ -103,63 +94,34 @@ class Batch:
 
     def __init__(self, missions: int, threads: int) -> None:
         """Make the environment."""
-        self.missions = missions
         self.env = EntropyExploreVectorEnv(ENDLESS, missions, threads=threads, autoreset_mode="SameStep")
 
     def run(self, actions: np.ndarray) -> Taken:
         """Return what the steps (steps, E, A, 5) take after a reset of all."""
-
-        def advance(steps: np.ndarray) -> None:
-            for action in steps:
-                self.env.step(action)
-
         self.env.reset(seed=0)
-        advance(actions[:_WARMING_STEPS])
-        taken = timed(lambda: advance(actions[_WARMING_STEPS:]))
+        taken = warmed(self.env.step, actions)
         check_bursts(self.env.missions.state.robots, ENDLESS.channel.burst)
         return taken
 
 
-def step_rates(scenarios: Mapping[str, Scenario], effort: Effort, peer: Spread | None) -> dict[str, list]:
-    """Return steps a second of one ParallelEnv of each scenario, and of the peer, round by round in turns."""
-    steps, jobs = effort.steps, dict[str, Job]()
-    for name, scenario in scenarios.items():
-        team = Team(scenario)
-        team.run(turns(1, 1, 0))
-        jobs[name] = lambda number, team=team: team.run(turns(steps, 1, number), number)
-    if peer is not None:
-        peer.run(_WARMING_STEPS)
-        jobs["peer"] = lambda _: timed(lambda: peer.run(steps))
-    taken = interleave(jobs, effort.rounds)
-    return {name: [steps / t.cpu_s for t in taken[name]] for name in taken}
-
-
 def step_rows(effort: Effort) -> list[Row]:
-    """Return steps beside simple_spread, and with drift, fiducials and summaries beside without."""
-    robot = {"localization": _DRIFT}
-    scenarios = {
-        "plain": TURNING,
-        "drifting": with_settings(TURNING, {"robot": robot, "fiducials": {"number": 8}}),
-        "summaries": with_settings(TURNING, {"channel": {"content": "summaries", "summary_every_s": 5.0}}),
+    """Return the row of steps a second beside simple_spread."""
+    team, spread, steps = Team(TURNING), Spread(ROBOTS, seed=0), effort.steps
+    team.run(turns(1, 1, 0))
+    spread.run(_WARMING_STEPS)
+    jobs: dict[str, Job] = {
+        "ours": lambda number: team.run(turns(steps, 1, number), number),
+        "theirs": lambda _: timed(lambda: spread.run(steps)),
     }
-    rates = step_rates(scenarios, effort, Spread(ROBOTS, seed=0))
-    job, unit = f"ParallelEnv.step, {ROBOTS} robots × {TURNING.sensor.rays} rays", "steps/s"
-    drifting = Goal("≥", 1.0 / 1.15)
-    plain, spread = rates["plain"], f"mpe2 simple_spread_v3, N = {ROBOTS}"
-    return [
-        compared(f"{job}, sharing in each step", spread, plain, rates["peer"], unit, Goal("≥", 2.0)),
-        compared(f"{job} that drift, 8 fiducials", "exact robots", rates["drifting"], plain, unit, drifting),
-        compared(f"{job}, a summary each 5 s", "batches", rates["summaries"], plain, unit),
-    ]
+    taken = interleave(jobs, effort.rounds)
+    ours, theirs = ([steps / each.cpu_s for each in taken[name]] for name in jobs)
+    job = f"ParallelEnv.step, {ROBOTS} robots × {TURNING.sensor.rays} rays, sharing in each step"
+    return [compared(job, f"mpe2 simple_spread_v3, N = {ROBOTS}", ours, theirs, "steps/s", Goal("≥", 2.0))]
 
 
 def vector_rows(effort: Effort) -> list[Row]:
     """Return rows of robot-steps a second: the VectorEnv beside ParallelEnvs, and two threads beside one."""
-    rows = [row for missions in effort.missions for row in batch_rows(missions, effort)]
-    many, few = Batch(max(effort.missions), 1), Batch(16, 1)
-    job, calls = f"Python calls in a VectorEnv.step, {many.missions} missions", Goal("=", 1.0)
-    rows.append(compared(job, "16 missions", [python_calls(many)], [python_calls(few)], "calls", calls))
-    return rows
+    return [row for missions in effort.missions for row in batch_rows(missions, effort)]
 
 
 def batch_rows(missions: int, effort: Effort) -> list[Row]:
@@ -196,56 +158,3 @@ def batch_rows(missions: int, effort: Effort) -> list[Row]:
         doubled = Goal("≥", 1.7) if missions == LOOPED else None
         rows.append(compared(f"{job}, 2 threads", "1 thread", two, one, unit, doubled))
     return rows
-
-
-def python_calls(batch: Batch, steps: int = 5) -> float:
-    """Return calls of Python and C functions in one step."""
-    actions = turns(steps, batch.missions, 0)
-    batch.run(actions)
-    count = 0
-
-    def note(frame: FrameType, event: str, argument: object) -> None:
-        nonlocal count
-        count += event in ("call", "c_call")
-
-    for action in actions[:steps]:
-        sys.setprofile(note)
-        try:
-            batch.env.step(action)
-        finally:
-            sys.setprofile(None)
-    return count / steps
-
-
-def size_rows(effort: Effort) -> list[Row]:
-    """Return rows of microseconds a step in larger worlds beside the room: what rays cost, not the world.
-
-    Two robots observe the pooled overview of their beliefs; their rays end after 2.5 m, so that they do the
-    same work in any world.
-    """
-    walks = {shape: _walk(shape) for shape in (SHAPES if effort.large else SHAPES[:3])}
-    taken = interleave({str(shape): walk for shape, walk in walks.items()}, effort.rounds)
-    step_us = {name: [1e6 * t.cpu_s / _WALK_STEPS for t in rounds] for name, rounds in taken.items()}
-    peer, room = f"{math.prod(SHAPES[0]):,} voxels", step_us[str(SHAPES[0])]
-    job, most = "ParallelEnv.step, 2 robots, overview on", Goal("≤", 1.5)
-    return [
-        compared(f"{job}, {math.prod(shape):.0e} voxels", peer, step_us[str(shape)], room, "µs", most)
-        for shape in list(walks)[1:]
-    ]
-
-
-def _walk(shape: tuple[int, int, int]) -> Job:
-    """Return steps in an empty world of some shape, with the same random actions in each round."""
-    settings = {"robots": 2, "decision_period_s": None, "sensor": {"max_range_m": 2.5}, "ending": _NO_END}
-    settings |= {"channel": {"i_min_bits": 0.0}, "observation": {"overview": True}}
-    env = EntropyExploreEnv(with_settings(ROOM, {**settings, "grid": Grid(shape, ROOM.grid.voxel_size_m)}))
-    env.reset(seed=0)
-    boxes = np.random.default_rng(0).uniform(-1.0, 1.0, (_WALK_STEPS, 2, 5)).astype(np.float32)
-    actions = [dict(zip(env.possible_agents, row, strict=True)) for row in boxes]
-
-    def advance() -> None:
-        for action in actions:
-            env.step(action)
-
-    advance()  # touches the memory around the robots
-    return lambda _: timed(advance)

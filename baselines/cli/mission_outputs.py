@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
@@ -84,6 +84,17 @@ def _prepare(outputs: Outputs, out: Path | None, record: Path | None) -> None:
                 raise SettingError(option, str(file), "a file, not a folder")
 
 
+def film_moment(env: EntropyExploreEnv, painter: Painter, films: Iterable[Film]) -> None:
+    """Add a picture of the moment to the films in which one is due; the last moment is in all of them."""
+    painter.watch(env.missions)
+    time_s = float(env.missions.state.missions[0]["time_s"])
+    due = [film for film in films if film.due(time_s) or not env.agents]
+    picture = painter.picture(env.missions) if due else None
+    for film in due:
+        assert picture is not None  # "rgb_array" gives one
+        film.add(time_s, picture)
+
+
 class MissionLog:
     """Follows the mission of an environment; used as a context, so that nothing unfinished is left."""
 
@@ -141,22 +152,11 @@ class MissionLog:
         self.commands.note()
         for follower in self._followers:
             follower.note()
-        if not self._films:
-            return
-        self._painter.watch(env.missions)
-        time_s = float(env.missions.state.missions[0]["time_s"])
-        films = [film for film in self._films.values() if film.due(time_s) or not env.agents]
-        picture = self._painter.picture(env.missions) if films else None
-        for film in films:
-            if picture is not None:
-                film.add(time_s, picture)
+        if self._films:
+            film_moment(env, self._painter, self._films.values())
 
     def finish(self, strategy: str, **more: Any) -> tuple[dict[str, Any], list[Path]]:  # noqa: ANN401 - JSON
-        """Sum the mission up and write the files, each whole or not at all.
-
-        Args:
-            strategy: Name of the strategy that chose the commands.
-            **more: Further figures.
+        """Sum the mission up, with further figures, and write the files, each whole or not at all.
 
         Returns:
             The figures, and what was written.

@@ -24,14 +24,9 @@ _NARROW = 560
 
 
 def mission_picture(recorder: Recorder, end: Frame, title: str, strategy: str, truth: bool = False) -> bytes:
-    """Draw entropy curves, what the team has sent, and the maps at the end with all robots' paths.
+    """Draw the entropy curves of a mission, what the team has sent, and its end with all robots' paths.
 
-    Args:
-        recorder: Record of a mission that has ended.
-        end: Its last moment.
-        title: The scenario and its world.
-        strategy: Name of the strategy.
-        truth: Whether the true world stands below.
+    The title says the scenario and its world. With `truth` the true world stands below.
 
     Returns:
         A PNG file.

@@ -94,11 +94,7 @@ class Option:
 
 
 def options_of(kind: type, default: Any) -> list[Option]:  # noqa: ANN401 - an instance of the dataclass
-    """Return the options in the fields of a dataclass, and in dataclasses within it.
-
-    Args:
-        kind: The dataclass.
-        default: An instance with the values of options that are not given.
+    """Return the options in the fields of a dataclass, and in dataclasses within it, with their defaults.
 
     Raises:
         MissingExtraError: The parser of docstrings, which the help needs, is not installed.

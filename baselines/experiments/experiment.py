@@ -25,10 +25,7 @@ Records = dict[str, list[Record]]
 def sample(records: Records, cell: str, figure: str = "t_mission_s") -> np.ndarray:
     """Return (N,) a figure of each mission of a cell, by seed; missions cut off count with their limit.
 
-    Args:
-        records: By cell.
-        cell: Its name.
-        figure: Name of a number in a record; dots lead into its parts, as in `joint.explored`.
+    Dots in the name of a figure lead into parts of a record, as in `joint.explored`.
     """
     found: list[Any] = list(records[cell])
     for name in figure.split("."):
@@ -105,15 +102,9 @@ class Experiment:
 def reproduce(
     experiment: Experiment, amount: Amount, table: Path, how: How, out: Path, command: str
 ) -> list[Claim]:
-    """Run what is missing of an experiment, judge it and write its page; return its claims.
+    """Run what is missing in an experiment's table, judge it and write its page; return its claims.
 
-    Args:
-        experiment: What.
-        amount: How much.
-        table: The file of its rows.
-        how: Where.
-        out: Folder of the page; in a folder beside it lie its figures and `claims.csv`.
-        command: What makes the same page again.
+    In a folder beside the page lie its figures and `claims.csv`. The page says the command that makes it.
     """
     rows = [row for row in run_trials(experiment.trials(amount), table, how) if row is not None]
     records = by_cell(rows)

@@ -81,12 +81,7 @@ def scripted_env(
     surroundings: Surroundings | None = None,
     **settings: Any,  # noqa: ANN401 - whatever a setting may be
 ) -> EntropyExploreEnv:
-    """Return an environment for scripted strategies.
-
-    Args:
-        scenario: The task.
-        surroundings: Of its missions; None = no others than the scenario says.
-        **settings: Fields of the scenario to change.
+    """Return an environment for scripted strategies, with some fields of the scenario changed.
 
     Raises:
         SettingError: A setting is not allowed.
@@ -102,7 +97,7 @@ def run_mission(
     strategy: Strategy,
     seed: int,
     after_step: Callable[[EntropyExploreEnv], None] | None = None,
-    before_step: Callable[[Mapping[str, Any]], None] | None = None,
+    before_step: Callable[[Mapping[str, Any]], bool | None] | None = None,
     options: dict[str, Any] | None = None,
     backs_off: bool = True,
 ) -> None:
@@ -113,7 +108,7 @@ def run_mission(
         strategy: Chooses the viewpoints.
         seed: Of the mission.
         after_step: Called after the reset and after every step.
-        before_step: Called with the actions before every step.
+        before_step: Called with the actions before every step; where it returns True the mission is left.
         options: Of the reset: where the robots start, and in which world.
         backs_off: Whether robots that drift back off from what blocks them: see `planner.driver`.
     """
@@ -131,8 +126,8 @@ def run_mission(
         chosen = choose_all(strategy, views)
         for view, viewpoint in zip(views, chosen, strict=True):
             actions[env.agents[view.robot]] = view.action_for(viewpoint)
-        if before_step is not None:
-            before_step(actions)
+        if before_step is not None and before_step(actions):
+            return
         env.step(actions)
         if after_step is not None:
             after_step(env)
@@ -169,11 +164,6 @@ def _idle_action(env: EntropyExploreEnv, agent: str) -> np.ndarray | np.int64:
 
 def mission_record(env: EntropyExploreEnv, strategy: str | Strategy, seed: int) -> Record:
     """Run a mission and record what reports need of it.
-
-    Args:
-        env: With any settings.
-        strategy: What chooses the viewpoints, or its name.
-        seed: Of the mission.
 
     Returns:
         The mission's figures; `half_s`, when the best map had lost half of H(0) - H_th; `sent_by_scan`,
@@ -231,13 +221,7 @@ class SuiteMission:
         return None if self.start is None else {"starts": [self.start]}
 
     def __call__(self, env: EntropyExploreEnv, strategy: str, seed: int, file: Path | None = None) -> Record:
-        """Run a mission and keep its figures, and what it cost on the clock.
-
-        Args:
-            env: With any settings.
-            strategy: Name of what chooses the viewpoints.
-            seed: Of the mission.
-            file: For the mission's record; None = it is not kept.
+        """Run a mission and keep its figures, what it cost on the clock, and its record if there is a file.
 
         Returns:
             `suite_figures`; and `clock`: `decision_ms` and `worst_decision_ms`, the time that the strategy
@@ -267,13 +251,9 @@ def replay_commands(
     after_step: Callable[[EntropyExploreEnv], None] | None = None,
     before_step: Callable[[Mapping[str, Any]], None] | None = None,
 ) -> int:
-    """Give an environment the commands of a record, until they or the mission end.
+    """Give an environment the commands of a record, until they or the mission end; see `run_mission`.
 
-    Args:
-        env: Just reset, as the record's mission was.
-        record: Whose commands.
-        after_step: Called after every step.
-        before_step: Called with the actions before every step.
+    The environment was just reset, as the record's mission was.
 
     Returns:
         How many commands were given.

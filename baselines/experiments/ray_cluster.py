@@ -62,11 +62,7 @@ def ray_of(extra: str) -> Any:  # noqa: ANN401 - a module that may not be there
 
 
 def start_here(ray: Any, cores: int) -> None:  # noqa: ANN401 - the module
-    """Start a cluster of this machine alone.
-
-    Args:
-        ray: The module.
-        cores: How many it offers to tasks.
+    """Start a cluster of this machine alone, which offers some cores to tasks.
 
     Raises:
         EntropyExploreError: It does not start.

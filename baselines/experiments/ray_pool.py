@@ -30,13 +30,8 @@ def run_on_cluster(
 ) -> Generator[tuple[Task, Result | Failure], None, None]:
     """Do the work for every task on the cluster, and yield results as they come.
 
-    Joins the cluster, or starts it, unless this process has done so already, and leaves it then.
-
-    Args:
-        work: A function that every machine of the cluster can import.
-        tasks: What it takes; they and the results can be pickled.
-        cluster: Where.
-        limit_s: Of every task, on the clock from when it is begun, as of tasks in this process; inf = none.
+    Joins the cluster, or starts it, unless this process has done so already, and leaves it then. Every
+    machine of it can import the work. See `worker_pool.run_each`.
 
     Raises:
         MissingExtraError: Ray is not installed.

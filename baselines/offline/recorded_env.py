@@ -49,24 +49,13 @@ def observed_scenario(scenario: Scenario, observation: Observation) -> Scenario:
 
 
 def recorded_env(scenario: Scenario, surroundings: Surroundings) -> RecordedEnv:
-    """Return an environment for recording.
-
-    Args:
-        scenario: Of `observed_scenario`.
-        surroundings: Of its missions.
-    """
+    """Return an environment for recording missions in a scenario of `observed_scenario`."""
     changed = with_settings(scenario, {"decision_period_s": surroundings.decision_period_s})
     return RecordedEnv(changed, **surroundings.settings())
 
 
 def record_mission(env: RecordedEnv, strategy: str, seed: int, keep: Callable[[Row], None]) -> int:
     """Run a mission, and hand over its rows in order: step by step, in each the robots.
-
-    Args:
-        env: Of `recorded_env`.
-        strategy: Its name.
-        seed: Of the mission.
-        keep: Takes each row.
 
     Returns:
         How many decisions there were.

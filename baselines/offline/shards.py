@@ -31,11 +31,7 @@ METADATA = b"entropy_explore_env"
 
 
 def columns(scenario: Scenario) -> list[tuple[str, pa.DataType]]:
-    """Return the names and types of the columns.
-
-    Args:
-        scenario: With flat observations.
-    """
+    """Return the names and types of the columns, where observations are flat."""
     discrete = not action_space(scenario).shape
     return [
         ("mission", pa.int64()),
@@ -53,12 +49,7 @@ def columns(scenario: Scenario) -> list[tuple[str, pa.DataType]]:
 
 
 def schema_of(scenario: Scenario, strategy: str) -> pa.Schema:
-    """Return the schema of a file, with its metadata.
-
-    Args:
-        scenario: With flat observations.
-        strategy: Its name.
-    """
+    """Return the schema of a file, with its metadata, where observations are flat."""
     parts = ObservationLayout(scenario).parts
     described: dict[str, Any] = {
         "format": FORMAT,

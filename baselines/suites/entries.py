@@ -81,14 +81,9 @@ def record_file(folder: Path, cell: str, seed: int) -> Path:
 
 
 def write_entry(folder: Path, suite: Suite, quick: bool, author: str, how: How) -> bool:
-    """Run the missions of an entry that are missing, and write it.
+    """Run the missions that are missing in the folder of an entry, and write it.
 
-    Args:
-        folder: Of the entry; missions that are in it are not run again.
-        suite: With the strategies that are entered.
-        quick: Whether it is the quick form of the suite.
-        author: Who enters.
-        how: Where and how long.
+    The suite, whole or its quick form, has the strategies that are entered.
 
     Returns:
         Whether all missions were run; if not, the same call goes on.
@@ -168,11 +163,7 @@ class Verdict(NamedTuple):
 
 
 def check_entry(folder: Path, workers: int | RayCluster) -> tuple[About, list[Verdict]]:
-    """Check every mission of an entry, and write down how many rows hold.
-
-    Args:
-        folder: The entry.
-        workers: Processes, or a cluster.
+    """Check every mission of the entry in a folder, and write down how many rows hold.
 
     Raises:
         SettingError: The folder is no entry that can be read.

@@ -39,14 +39,9 @@ def archive_of(folder: Path, suite: str) -> Path:
 def write_page(
     folder: Path, results: Results, rows: Sequence[KeptRow], command: str, refused: Sequence[str] = ()
 ) -> Path:
-    """Write the archive of a suite, and the page on which it stands.
+    """Write the archive of a suite's rows, and the page on which it stands.
 
-    Args:
-        folder: For the page.
-        results: What the missions came to.
-        rows: Of all missions.
-        command: What makes the same page again.
-        refused: Why world files are refused.
+    The page says the command that makes it, and why world files are refused.
 
     Returns:
         Path of the page.

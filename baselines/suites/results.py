@@ -92,11 +92,7 @@ class Results:
     ) -> np.ndarray:
         """Return (N,) float64 a measure of each mission; its limit where the mission never came that far.
 
-        Args:
-            task: Where.
-            strategy: Whose.
-            measure: Which.
-            missions: Numbers of missions that were run; None = all of these.
+        Missions are numbers of some that were run; None = all of these.
         """
         limit, records = measure.limit(task.scenario), self.numbered(task, strategy)
         found = [measure.value(records[number]) for number in (records if missions is None else missions)]
@@ -141,14 +137,9 @@ def run_suite(
     known: Sequence[kept_rows.Row] = (),
     trial_of: Callable[[Cell, int], CellTrial] = CellTrial,
 ) -> list[kept_rows.Row | None]:
-    """Run what is missing of a suite; see `run_trials`.
+    """Run what is missing of a suite, and of its later tasks; see `run_trials`.
 
-    Args:
-        suite: Without its later tasks.
-        table: The file of rows.
-        how: Where and how long.
-        known: Rows from elsewhere.
-        trial_of: Makes a trial of a cell and a seed.
+    `trial_of` makes a trial of a cell and a seed.
 
     Returns:
         The row of each mission; None where the time was up.

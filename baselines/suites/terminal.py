@@ -23,13 +23,7 @@ def printed_results(results: Results) -> dict[str, Any]:
 
 
 def show_results(results: Results, refused: Sequence[str], tables: bool) -> None:
-    """Print a table over all tasks, missions that failed, and world files that were refused.
-
-    Args:
-        results: Of the suite.
-        refused: Why world files are refused.
-        tables: Print the tables of all tasks, too, in Markdown.
-    """
+    """Print a table over all tasks, or of each task in Markdown as well, what failed and what was refused."""
     if tables:
         print(tasks_table(results))
     own = results.suite.name == "own"

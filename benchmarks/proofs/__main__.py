@@ -80,11 +80,15 @@ class Args:
 
 
 class Played(NamedTuple):
-    """The cases of one proof: their number, what was found, and number → error of those that failed."""
+    """The cases of one proof: what was found, and number → error of those that failed."""
 
-    cases: int
     found: list[Found]
     failed: dict[int, str]
+
+    @property
+    def cases(self) -> int:
+        """Their number."""
+        return len(self.found) + len(self.failed)
 
 
 def main(words: Sequence[str]) -> int:
@@ -126,19 +130,18 @@ def _play_all(name: str, args: Args) -> Played:
     proof, begun_s = PROOFS[name], time.monotonic()
     cases = args.cases or (proof.full if args.full else proof.quick)
     numbers = range(args.first, args.first + cases)
-    played = Played(cases, [], {})
+    played = Played([], {})
     for number, outcome in play_cases(proof.play, numbers, proof.limit_s):
         if isinstance(outcome, Found):
             played.found.append(outcome)
         else:
             played.failed[number] = outcome
             print(f"\r{again(name, number)}\n    {outcome}", file=sys.stderr)
-        done = len(played.found) + len(played.failed)
-        print(f"\r{name}: {done:,} of {cases:,}", end="", file=sys.stderr, flush=True)
+        print(f"\r{name}: {played.cases:,} of {cases:,}", end="", file=sys.stderr, flush=True)
         if time.monotonic() - begun_s > args.limit_s:
             break
     print(file=sys.stderr)
-    return played._replace(cases=done)
+    return played
 
 
 def again(name: str, number: int) -> str:

@@ -15,12 +15,9 @@ import sys
 from functools import cache
 
 import numpy as np
-from gymnasium import spaces
 
-from benchmarks.proofs.cases import BrokenPromiseError, Found
-from benchmarks.proofs.drawn_scenarios import Drawn, draw_scenario
-from entropy_explore_env.errors import EntropyExploreError
-from entropy_explore_env.missions.action import action_space
+from benchmarks.proofs.cases import BrokenPromiseError, Found, walk
+from benchmarks.proofs.drawn_scenarios import first_allowed
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.state_digest import state_digest
 
@@ -59,7 +56,8 @@ def _digests(first: int, variant: tuple[str, int, int]) -> list[str]:
         variables |= {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
     if processor == "haswell":
         variables["NUMBA_CPU_FEATURES"] = "+avx2,+fma,+bmi,+bmi2"
-    code = f"from {__name__} import print_digests; print_digests({first}, {threads}, {missions})"
+    numbers = range(first, first + SCENARIOS_EACH)
+    code = f"from {__name__} import print_digests; print_digests({numbers}, {threads}, {missions})"
     words = [sys.executable, "-W", "ignore", "-c", code]
     done = subprocess.run(words, env=variables, capture_output=True, text=True, check=False)
     if done.returncode:
@@ -67,36 +65,19 @@ def _digests(first: int, variant: tuple[str, int, int]) -> list[str]:
     return json.loads(done.stdout)
 
 
-def print_digests(first: int, threads: int, missions: int) -> None:
+def print_digests(numbers: range, threads: int, missions: int) -> None:
     """Print the digests of some scenarios as JSON; processes with several missions are forked."""
     if missions > 1 and hasattr(os, "fork"):
         child = os.fork()
         if child:
             sys.exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
-    numbers = range(first, first + SCENARIOS_EACH)
     print(json.dumps([digest_of(number, threads, missions) for number in numbers]))
 
 
 def digest_of(number: int, threads: int, missions: int) -> str:
     """Return the digest of the first of some missions in a drawn scenario; the others are other episodes."""
-    drawn = next(drawn for draw in itertools.count() if (drawn := allowed(number, draw)) is not None)
+    drawn, _ = first_allowed(number, few_kernels=True)
     team = Missions(drawn.scenario, missions, threads, drawn.given)
     team.reset_some(range(missions), [number] * missions)
-    rng = np.random.default_rng(number)
-    axes, space = 5, action_space(drawn.scenario)
-    choices = int(space.n) if isinstance(space, spaces.Discrete) else 1
-    for _ in range(STEPS):
-        boxes = rng.uniform(-1.0, 1.0, (1, drawn.scenario.robots, axes)).astype(np.float32).astype(np.float64)
-        numbers = rng.integers(0, choices, (1, drawn.scenario.robots))
-        team.step(np.repeat(boxes, missions, axis=0), np.repeat(numbers, missions, axis=0))
+    walk(team, np.random.default_rng(number), STEPS, alike=True)
     return state_digest(team, 0)
-
-
-def allowed(number: int, draw: int) -> Drawn | None:
-    """Return a drawn scenario, if it is allowed and its first mission has room."""
-    try:
-        drawn = draw_scenario(np.random.default_rng([number, draw, 1]), few_kernels=True)
-        Missions(drawn.scenario, given=drawn.given).reset(0, number)
-    except EntropyExploreError:
-        return None
-    return drawn

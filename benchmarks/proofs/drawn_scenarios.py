@@ -15,7 +15,8 @@ from typing import Any, Literal, NamedTuple, Union, get_args, get_origin
 
 import numpy as np
 
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import EntropyExploreError, SettingError
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.robot import Robot
@@ -55,13 +56,20 @@ class Drawn(NamedTuple):
     given: tuple[World, ...]
 
 
-def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:
-    """Draw all settings of a scenario.
+def first_allowed(number: int, few_kernels: bool) -> tuple[Drawn, int]:
+    """Draw scenarios until one is allowed and its first mission has room; also return how many were not."""
+    refused = 0
+    while True:
+        try:
+            drawn = draw_scenario(np.random.default_rng([number, refused]), few_kernels)
+            Missions(drawn.scenario, given=drawn.given).reset(0, number)
+            return drawn, refused
+        except EntropyExploreError:
+            refused += 1
 
-    Args:
-        rng: Where from.
-        few_kernels: Stay with the kernels of one of a few scenarios: others take seconds to compile.
-    """
+
+def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:
+    """Draw all settings of a scenario, or with few kernels those that need no others: they compile slowly."""
     grid, given = _grid(rng), rng.random() < 0.3
     world = "empty" if given or rng.random() < 0.5 else str(rng.choice(sorted(RECIPES)))
     robot: dict[str, Any] = {

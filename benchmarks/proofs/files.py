@@ -12,17 +12,18 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from benchmarks.proofs.cases import BrokenPromiseError, Found
 from benchmarks.proofs.hostile_worlds import mutant
-from benchmarks.proofs.saved_files import SAVED, Saved
-from benchmarks.proofs.world_samples import Sample, samples
+from benchmarks.proofs.saved_files import SAVED
+from benchmarks.proofs.world_samples import SAMPLES
 from entropy_explore_env.errors import EntropyExploreError, WorldWarning
 from entropy_explore_env.worlds.files.process import CPU_S, ReaderProcess, kept_reader
 from entropy_explore_env.worlds.load import load_world
@@ -34,26 +35,9 @@ except ImportError:  # Windows
 
 BATCH = 500
 """Files of a case."""
-WORLDS = (
-    "octomap",
-    "map_server",
-    "image",
-    "height png",
-    "pcd",
-    "ply",
-    "obj",
-    "stl",
-    "glb",
-    "height npz",
-    "geotiff",
-    "world npz",
-    "las",
-    "dae",
-    "esri grid",
-    "other images",
-)
-"""Formats of worlds, as `world_samples` names them."""
-FORMATS = (*SAVED, *WORLDS)
+FORMATS = (*SAVED, *SAMPLES)
+_OUTSIDE_SHAPE = (3, 2, 1)
+"""Of a file that must not be read; no changed sample has it."""
 MOST_S, MOST_SAVED_S = 3.0, 5.0
 """Most processor time for a world's file, with the start of a process that reads it, and for a record or
 checkpoint and what it describes."""
@@ -109,96 +93,68 @@ def read_saved(name: str, folder: Path, count: int, seed: int) -> Reads:
     """Change and read records or checkpoints; see `read_changed`."""
     saved = SAVED[name](folder)
     with _little_memory():
-        return read_changed(saved, folder / "changed", count, seed, MOST_SAVED_S)
-
-
-class Worlds:
-    """World files of one format."""
-
-    def __init__(self, sources: list[Sample]) -> None:
-        """Take the sound samples."""
-        self._sources, self._sample = sources, sources[0]
-
-    def changed(self, number: int, rng: np.random.Generator) -> tuple[str, dict[str, bytes]]:
-        """Change one of the samples."""
-        what, self._sample = mutant(self._sources, number, rng)
-        return what, self._sample.files
-
-    def load(self, folder: Path) -> None:
-        """Load the sample that was changed last.
-
-        Raises:
-            BrokenPromiseError: It ran code, or read a file outside the folder.
-        """
-        path = folder / next(iter(self._sample.files))
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", WorldWarning)
-                world = load_world(path, **self._sample.options)
-        finally:
-            if (folder / "executed").exists() or Path("executed").exists():
-                raise BrokenPromiseError("ran code")
-        if world.grid.shape == _OUTSIDE_SHAPE:
-            raise BrokenPromiseError("read a file outside")
-
-
-_OUTSIDE_SHAPE = (3, 2, 1)
-"""No changed sample has it; all its cells are free."""
+        return read_changed(saved.changed, saved.load, folder / "changed", count, seed, MOST_SAVED_S)
 
 
 def read_worlds(name: str, folder: Path, count: int, seed: int, reader: ReaderProcess | None = None) -> Reads:
-    """Change and read world files beside a file that must not be read; see `read_changed`.
+    """Change and read world files, in an empty folder beside a file that must not be read.
 
-    Args:
-        name: Of WORLDS.
-        folder: Empty.
-        count: Number of files.
-        seed: Of the changes.
-        reader: Process that reads them and goes on afterwards; None = a new one.
+    See `read_changed`; a reader that is given goes on afterwards.
     """
-    inside = folder / "maps"
+    inside, sources = folder / "maps", SAMPLES[name]()
     (inside / "sub").mkdir(parents=True)
     secret = folder / "outside.pgm"
-    secret.write_bytes(b"P5\n3 2\n255\n" + b"\xfe" * 6)
+    secret.write_bytes(b"P5\n%d %d\n255\n" % _OUTSIDE_SHAPE[:2] + b"\xfe" * 6)
     with contextlib.suppress(OSError):  # not everybody may make links on Windows
         (inside / "link.pgm").symlink_to(secret)
         (inside / "linked").symlink_to(folder)
+    change, load = partial(mutant, sources), partial(_load_world, sources[0].options)
     with kept_reader(reader) as kept:
-        return read_changed(Worlds(_samples()[name]), inside, count, seed, MOST_S, kept)
+        return read_changed(change, load, inside, count, seed, MOST_S, kept)
 
 
-_samples = cache(samples)
+def _load_world(options: dict[str, Any], path: Path) -> None:
+    """Load a world.
+
+    Raises:
+        BrokenPromiseError: It ran code, or read a file outside the folder.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", WorldWarning)
+            world = load_world(path, **options)
+    finally:
+        if path.with_name("executed").exists() or Path("executed").exists():
+            raise BrokenPromiseError("ran code")
+    if world.grid.shape == _OUTSIDE_SHAPE:
+        raise BrokenPromiseError("read a file outside")
 
 
 def read_changed(
-    form: Saved | Worlds,
+    change: Callable[[int, np.random.Generator], tuple[str, dict[str, bytes]]],
+    load: Callable[[Path], object],
     folder: Path,
     count: int,
     seed: int,
     most_s: float,
     reader: ReaderProcess | None = None,
 ) -> Reads:
-    """Change files, load them, and note what is wrong with how each was treated.
+    """Change files, load them in a process or in this one, and note what is wrong with how they were treated.
 
-    Args:
-        form: What changes and loads them.
-        folder: Where they are written.
-        count: Number of changes.
-        seed: Of the changes.
-        most_s: Most processor time for a file.
-        reader: Process that reads the files; None = this one.
+    `change` returns what is done to the files by name, and the files with it; `load` takes the path of the
+    first of them in the folder. Each may take `most_s` of the processor.
     """
     reads, there = Reads(), dict[str, bytes]()
     folder.mkdir(exist_ok=True)
     before_mib = _peak_mib()
     for number in range(count):
-        what, files = form.changed(number, np.random.default_rng([seed, number]))
+        what, files = change(number, np.random.default_rng([seed, number]))
         for name, content in files.items():
             if there.get(name) != content:
                 (folder / name).write_bytes(content)
                 there[name] = content
         reads.files += 1
-        complaint = _read(form, folder, most_s, reader, reads)
+        complaint = _read(partial(load, folder / next(iter(files))), most_s, reader, reads)
         if complaint:
             reads.wrong.append(f"[{seed}, {number}] {what}: {complaint[:200]}")
     grown_mib = _peak_mib() - before_mib
@@ -209,16 +165,14 @@ def read_changed(
     return reads
 
 
-def _read(
-    form: Saved | Worlds, folder: Path, most_s: float, reader: ReaderProcess | None, reads: Reads
-) -> str:
-    """Load what lies in a folder; returns what is wrong with how it was treated, or an empty text."""
+def _read(load: Callable[[], object], most_s: float, reader: ReaderProcess | None, reads: Reads) -> str:
+    """Load files; returns what is wrong with how they were treated, or an empty text."""
     earlier_s = reader.cost["cpu_s"] if reader is not None and reader.cost else 0.0
     if reader is not None:
         reader.cost = None
     complaint, begun_s = "", time.process_time()
     try:
-        form.load(folder)
+        load()
         reads.loaded += 1
     except EntropyExploreError as error:
         if "\n" in str(error) or len(str(error)) > _MOST_ERROR:

@@ -226,13 +226,13 @@ MUTATORS: tuple[Callable[[bytes, np.random.Generator], bytes], ...] = (
 )
 
 
-def mutant(sources: list[Sample], number: int, rng: np.random.Generator) -> tuple[str, Sample]:
+def mutant(sources: list[Sample], number: int, rng: np.random.Generator) -> tuple[str, dict[str, bytes]]:
     """Return one of the samples, by its number, with a drawn change, and the name of the change."""
-    source, mutate = sources[number % len(sources)], MUTATORS[int(rng.integers(len(MUTATORS)))]
-    target, *others = source.files
+    files, mutate = sources[number % len(sources)].files, MUTATORS[int(rng.integers(len(MUTATORS)))]
+    target, *others = files
     if others and mutate is not hostile_yaml and rng.random() < 0.5:
         target = others[0]
-    changed = mutate(source.files[target], rng)
+    changed = mutate(files[target], rng)
     if changed and rng.random() < 0.2:
         changed = flipped(changed, rng)
-    return mutate.__name__, Sample({**source.files, target: changed}, source.options)
+    return mutate.__name__, {**files, target: changed}

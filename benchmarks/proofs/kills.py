@@ -6,20 +6,14 @@ times on the clock, is compared with the files of an undisturbed one.
 
 from __future__ import annotations
 
-import io
 import json
 import lzma
-import os
 import random
-import signal
 import tempfile
-import time
-from collections.abc import Callable
-from contextlib import redirect_stderr, redirect_stdout
 from functools import cache
 from pathlib import Path
 
-from benchmarks.proofs.cases import BrokenPromiseError, Found
+from benchmarks.proofs.cases import BrokenPromiseError, Command, Found
 
 KILLS = 10
 """Of a sweep, in a case."""
@@ -27,7 +21,6 @@ _SWEEP = ("--scenarios", "box-7x11x5", "--robots", "1,2", "--time-limit-s", "150
 _WORDS = (*_SWEEP, "--strategies", "gradient", "--seeds", "6", "--jobs", "1")
 _MISSIONS = 24
 """Two strategies (the baseline is added), two team sizes, six seeds."""
-_WAIT_S = 300.0
 
 
 def play(number: int) -> Found:
@@ -45,16 +38,13 @@ def kill_sweep(folder: Path, moments: random.Random) -> list[int]:
     """Kill a sweep; returns the number of missions that were kept each time."""
     expected, kept = _undisturbed(), list[int]()
     for target in sorted(moments.sample(range(_MISSIONS - 1), KILLS)):
-        child = _start(lambda: _sweep(folder))
-        _until(lambda target=target: len(_missions(folder)) >= target, child)
-        time.sleep(moments.uniform(0.0, 0.01))
-        _kill(child)
+        _sweep(folder).kill_when(
+            lambda target=target: len(_missions(folder)) >= target, moments.uniform(0.0, 0.01)
+        )
         kept.append(len(_missions(folder)))
         if kept != sorted(kept):
             raise BrokenPromiseError(f"a mission was lost: {kept}")
-        if kept[-1] >= _MISSIONS:
-            raise BrokenPromiseError("the sweep had ended before it was killed: no kill at all")
-    _sweep(folder)
+    _sweep(folder).finish()
     found = contents(folder)
     differing = [name for name in expected.keys() | found.keys() if expected.get(name) != found.get(name)]
     if differing:
@@ -65,18 +55,12 @@ def kill_sweep(folder: Path, moments: random.Random) -> list[int]:
 @cache
 def _undisturbed() -> dict[str, bytes]:
     with tempfile.TemporaryDirectory() as folder:
-        _sweep(Path(folder))
+        _sweep(Path(folder)).finish()
         return contents(Path(folder))
 
 
-def _sweep(folder: Path) -> None:
-    from baselines import benchmark
-    from baselines.cli.arguments import run_command
-
-    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
-        code = run_command(benchmark.main, [*_WORDS, "--out", str(folder)])
-    if code:
-        raise BrokenPromiseError(f"the sweep ended with exit code {code}")
+def _sweep(folder: Path) -> Command:
+    return Command("baselines.benchmark", (*_WORDS, "--out", str(folder)))
 
 
 def _missions(folder: Path) -> list[bytes]:
@@ -101,35 +85,3 @@ def _without_clock(path: Path) -> bytes:
     for mission in missions:
         mission["record"].pop("clock", None)  # what failed has none
     return json.dumps(missions).encode()
-
-
-def _start(work: Callable[[], None]) -> int:
-    """Do work in a forked process, which shares imports and kernels; returns its number."""
-    child = os.fork()
-    if child == 0:
-        code = 1
-        try:
-            work()
-            code = 0
-        finally:
-            os._exit(code)
-    return child
-
-
-def _until(happened: Callable[[], bool], child: int) -> None:
-    """Wait until something has happened, or the process has ended.
-
-    Raises:
-        BrokenPromiseError: Neither comes.
-    """
-    begun_s = time.monotonic()
-    while not happened() and os.waitid(os.P_PID, child, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None:
-        if time.monotonic() - begun_s > _WAIT_S:
-            _kill(child)
-            raise BrokenPromiseError(f"nothing happened for {_WAIT_S:g} s")
-        time.sleep(0.0005)
-
-
-def _kill(child: int) -> None:
-    os.kill(child, signal.SIGKILL)
-    os.waitpid(child, 0)

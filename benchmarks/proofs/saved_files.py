@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from baselines.experiments.mission import run_mission
+from baselines.strategies import make_strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.mission_record import (
@@ -37,7 +39,7 @@ class Saved(NamedTuple):
 
     Attributes:
         files: Name → sound content.
-        load: Reads those of a folder.
+        load: Reads those beside the first, from the path of that.
         repair: Makes the digests right again, where that is possible.
     """
 
@@ -149,25 +151,18 @@ CHANGES: tuple[Change, ...] = (
 
 def record_files(folder: Path) -> Saved:
     """Return the record of a short mission, with starts that were given."""
-    env = EntropyExploreEnv(with_settings(BOX, {"channel": {"delay_s": 1.0}}))
+    env = EntropyExploreEnv(with_settings(BOX, {"channel": {"delay_s": 1.0}, "max_cycles": 3}))
     env.reset(seed=5)
-    starts = env.missions.state.robots[0]["origin"].copy()
-    env.reset(seed=5, options={"starts": starts})
-    recorder = CommandRecorder(env.missions)
-    for agent in env.possible_agents:
-        env.action_space(agent).seed(1)
-    for _ in range(3):
-        actions = {agent: env.action_space(agent).sample() for agent in env.agents}
-        recorder.command(actions)
-        env.step(actions)
-        recorder.note()
+    starts, recorder = env.missions.state.robots[0]["origin"].copy(), CommandRecorder(env.missions)
+    watched = lambda _: recorder.note(), recorder.command
+    run_mission(env, make_strategy("random"), 5, *watched, {"starts": starts})
     save_record(recorder.record("random"), folder / "mission.npz")
     return Saved({"mission.npz": (folder / "mission.npz").read_bytes()}, _play_record, _with_checksum)
 
 
-def _play_record(folder: Path) -> object:
+def _play_record(path: Path) -> object:
     """Read a record, and start its mission."""
-    record = load_record(folder / "mission.npz")
+    record = load_record(path)
     env = EntropyExploreEnv(record.scenario, **given_worlds_of(record))
     env.reset(seed=record.seed, options=reset_options_of(record))
     return env
@@ -209,12 +204,12 @@ def checkpoint_files(folder: Path) -> Saved:
     return Saved(files, _load_checkpoint, _with_digests)
 
 
-def _load_checkpoint(folder: Path) -> object:
+def _load_checkpoint(path: Path) -> object:
     """Read a checkpoint, and make its policy."""
     from training.checkpoints import load_checkpoint
     from training.policy import load_policy
 
-    return load_policy(load_checkpoint(folder, training=True))
+    return load_policy(load_checkpoint(path.parent, training=True))
 
 
 def _with_digests(files: dict[str, bytes]) -> dict[str, bytes]:

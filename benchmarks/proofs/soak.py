@@ -21,7 +21,6 @@ import numpy as np
 from benchmarks.proofs.cases import BrokenPromiseError, Found, check_step
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.missions.state_ranges import check_ranges
-from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import SCENARIOS
 
 ROBOT_STEPS = 20_000
@@ -92,27 +91,21 @@ def play_memory(number: int) -> Found:
 def walk(name: str, channel: dict[str, Any], robot_steps: int, seed: int) -> tuple[int, int]:
     """Play a batch of missions by drawn actions; returns robot-steps and the number of missions begun."""
     scenario = SCENARIOS[name]
-    env = EntropyExploreVectorEnv(
-        scenario, missions_of(scenario), channel=channel, ending={"max_cycles": _CYCLES}
-    )
+    count = min(max(_MOST_VOXELS // (scenario.grid.voxels * scenario.robots), 1), _MOST_MISSIONS)
+    env = EntropyExploreVectorEnv(scenario, count, channel=channel, ending={"max_cycles": _CYCLES})
     env.action_space.seed(seed % 2**31)
     env.reset(seed=seed * _MOST_MISSIONS)
-    steps, team = math.ceil(robot_steps / (env.num_envs * scenario.robots)), env.num_envs * scenario.robots
-    before = _moment(env)
+    team, before = count * scenario.robots, _moment(env)
+    steps = math.ceil(robot_steps / team)
     for step in range(steps):
         stepped, now = env.step(env.action_space.sample()), _moment(env)
         check(env, stepped, before, now)
         before = now
         if step % _RANGES_EVERY == 0 or step == steps - 1:
             check_ranges(env.scenario, env.missions.state._asdict())
-    missions = int(sum(env.missions.episodes)) + env.num_envs
+    missions = int(sum(env.missions.episodes)) + count
     env.close()
     return steps * team, missions
-
-
-def missions_of(scenario: Scenario) -> int:
-    """Return how many missions of a scenario are played at once."""
-    return min(max(_MOST_VOXELS // (scenario.grid.voxels * scenario.robots), 1), _MOST_MISSIONS)
 
 
 def _moment(env: EntropyExploreVectorEnv) -> tuple[np.ndarray, np.ndarray]:
@@ -127,16 +120,9 @@ def check(
     before: tuple[np.ndarray, np.ndarray],
     now: tuple[np.ndarray, np.ndarray],
 ) -> None:
-    """Check a step against the moment before it.
+    """Raise a BrokenPromiseError unless a step kept the contract.
 
-    Args:
-        env: After the step.
-        stepped: What the step returned.
-        before: Records of missions (E,) and robots (E, A) before the step.
-        now: The same after it.
-
-    Raises:
-        BrokenPromiseError: A promise is broken.
+    It is told by what the step returned, and by records of missions (E,) and robots (E, A) before and after.
     """
     name = env.scenario.name
     _, rewards, terminated, truncated, infos = stepped

@@ -9,26 +9,20 @@ from __future__ import annotations
 import csv
 import importlib.util
 import math
-import os
 import random
-import signal
-import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from benchmarks.proofs.cases import BrokenPromiseError, Found
+from benchmarks.proofs.cases import ROOT, BrokenPromiseError, Command, Found
 
 ROBOT_STEPS, KILLS = 1_000_000, 3
 """Of a run."""
-_ROOT = Path(__file__).parents[2]
 _MAY_BE_MISSING = ("bits_per_bit", "planner_ratio")
 """Columns that are empty where nothing was sent, and where no planner proposes candidates."""
 _MOST_CHECKPOINTS = 4
 """Most further checkpoints after which a run is killed again."""
-_WAIT_S = 900.0
 
 
 class Trainer(NamedTuple):
@@ -72,69 +66,30 @@ def play(number: int) -> Found:
 
 
 def train(name: str, run: Path, words: tuple[str, ...], kills: int, moments: random.Random) -> int:
-    """Train in a folder, kill and resume the trainer, and check what it wrote; returns its robot-steps.
-
-    Args:
-        name: Of the trainer.
-        run: Folder of the run.
-        words: Options.
-        kills: Number of kills.
-        moments: Source of the moments.
+    """Train in a folder, kill and resume the trainer at drawn moments; returns the robot-steps.
 
     Raises:
         BrokenPromiseError: See play.
     """
-    words = (*TRAINERS[name].words, *words, "--out", str(run))
+    words, pattern = (*TRAINERS[name].words, *words, "--out", str(run)), TRAINERS[name].checkpoints
+    here = importlib.util.find_spec(TRAINERS[name].needs) is not None
+    python = sys.executable if here else str(ROOT / ".venv-rllib" / "bin" / "python")
     for _ in range(kills):
-        _kill_one(name, words, run, moments)
+        seen, written, wanted = set(run.glob(pattern)), set[Path](), moments.randint(1, _MOST_CHECKPOINTS)
+
+        def all_written(seen: set[Path] = seen, written: set[Path] = written, wanted: int = wanted) -> bool:
+            written |= set(run.glob(pattern)) - seen
+            return len(written) >= wanted
+
+        Command(name, words, python).kill_when(all_written, moments.uniform(0.0, 3.0))
         words = ("--resume", str(run))
-    with tempfile.TemporaryFile("w+") as said, _started(name, words, said) as last:
-        code = last.wait()
-        said.seek(0)
-        if code:
-            raise BrokenPromiseError(f"{name} ended with {code}: {said.read()[-300:]}")
+    Command(name, words, python).finish()
     check_policy(run)
     return check_curve(run / "curve.csv", TRAINERS[name].column)
 
 
-def _kill_one(name: str, words: tuple[str, ...], run: Path, moments: random.Random) -> None:
-    """Start a trainer, and kill it with all its processes after some further checkpoints."""
-    pattern, begun_s = TRAINERS[name].checkpoints, time.monotonic()
-    seen, written = set(run.glob(pattern)), set[Path]()
-    wanted = moments.randint(1, _MOST_CHECKPOINTS)
-    with _started(name, words, subprocess.DEVNULL) as child:
-        while len(written) < wanted:
-            if child.poll() is not None:
-                raise BrokenPromiseError(f"{name} ended with {child.returncode} before it was to be killed")
-            if time.monotonic() - begun_s > _WAIT_S:
-                os.killpg(child.pid, signal.SIGKILL)
-                raise BrokenPromiseError(f"{name} wrote no checkpoint for {_WAIT_S:g} s")
-            written |= set(run.glob(pattern)) - seen
-            time.sleep(0.05)
-        time.sleep(moments.uniform(0.0, 3.0))
-        os.killpg(child.pid, signal.SIGKILL)
-
-
-def _started(name: str, words: tuple[str, ...], said: Any) -> subprocess.Popen[Any]:  # noqa: ANN401 - a file
-    """Return a trainer in a process group of its own."""
-    here = importlib.util.find_spec(TRAINERS[name].needs) is not None
-    python = sys.executable if here else str(_ROOT / ".venv-rllib" / "bin" / "python")
-    return subprocess.Popen(
-        [python, "-m", name, *words],
-        cwd=_ROOT,
-        env={**os.environ, "PYTHONPATH": str(_ROOT)},
-        stdout=subprocess.DEVNULL,
-        stderr=said,
-        start_new_session=True,
-    )
-
-
 def check_curve(curve: Path, column: str) -> int:
-    """Check that all figures of a run's validations are finite; returns its robot-steps.
-
-    Raises:
-        BrokenPromiseError: One is not.
-    """
+    """Return the robot-steps of a run; a BrokenPromiseError says which of its figures is not finite."""
     with curve.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     for row in rows:
@@ -145,11 +100,7 @@ def check_curve(curve: Path, column: str) -> int:
 
 
 def check_policy(run: Path) -> None:
-    """Check that all weights of the policy that a run keeps are finite.
-
-    Raises:
-        BrokenPromiseError: One is not.
-    """
+    """Raise a BrokenPromiseError unless all weights of the policy that a run keeps are finite."""
     from training.checkpoints import latest_checkpoint, load_checkpoint
 
     for weights, tensor in load_checkpoint(latest_checkpoint(run, "best")).weights.items():

@@ -6,6 +6,7 @@ import io
 import json
 import struct
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,12 +40,7 @@ def pgm(shades: np.ndarray) -> bytes:
     return b"P5\n%d %d\n255\n" % (shades.shape[1], shades.shape[0]) + shades.tobytes()
 
 
-def png(pixels: np.ndarray) -> bytes:
-    """Return a PNG of these pixels."""
-    return image(pixels, "PNG")
-
-
-def image(pixels: np.ndarray, kind: str) -> bytes:
+def image(pixels: np.ndarray, kind: str = "PNG") -> bytes:
     """Return an image of these pixels, of a kind by Pillow's name."""
     from PIL import Image
 
@@ -177,39 +173,45 @@ def glb_of_json(gltf: dict[str, Any], blob: bytes = b"") -> bytes:
     return struct.pack("<III", 0x46546C67, 2, 12 + len(body)) + body
 
 
-def samples() -> dict[str, list[Sample]]:
-    """Return loader → files of every kind that it reads."""
-    cell = {"voxel_size_m": 0.5}
-    deep = (plan().astype(np.uint16) * 200).astype(np.uint16)
-    return {
-        "octomap": [Sample({f"map{suffix}": octomap_bytes(suffix)}, {}) for suffix in (".bt", ".ot")],
-        "map_server": [
-            Sample({"map.yaml": YAML, "plan.pgm": pgm(plan())}, {}),
-            Sample({"map.yaml": YAML.replace(b"pgm", b"png"), "plan.png": png(plan())}, {}),
-        ],
-        "image": [Sample({"plan.png": png(sketch())}, {}), Sample({"plan.pgm": pgm(sketch())}, {})],
-        "other images": [
-            Sample({f"plan.{suffix}": image(sketch(), kind)}, {})
-            for suffix, kind in (("jpg", "JPEG"), ("bmp", "BMP"), ("gif", "GIF"))
-        ],
-        "height png": [Sample({"hills.png": png(deep)}, {"resolution_m": 1.0, "elevation_step_m": 0.001})],
-        "pcd": [Sample({"cloud.pcd": pcd(each)}, cell) for each in ("ascii", "binary", "binary_compressed")],
-        "las": [Sample({"scan.las": las(False)}, cell), Sample({"scan.laz": las(True)}, cell)],
-        "esri grid": [Sample({"hills.asc": esri_grid()}, {})],
-        "dae": [Sample({"box.dae": mesh("dae")}, cell)],
-        "ply": [
-            Sample({"cloud.ply": ply(True)}, cell),
-            Sample({"cloud.ply": ply(False)}, cell),
-            Sample({"box.ply": mesh("ply")}, cell),
-        ],
-        "obj": [Sample({"box.obj": mesh("obj")}, cell)],
-        "stl": [Sample({"box.stl": mesh("stl")}, cell), Sample({"box.stl": mesh("stl_ascii")}, cell)],
-        "glb": [Sample({"box.glb": mesh("glb")}, cell)],
-        "height npz": [Sample({"hills.npz": npz(elevation=heights(), spacing_m=np.float64(0.5))}, {})],
-        "geotiff": [
-            Sample({"hills.tif": geotiff(heights())}, {}),
-            Sample({"hills.tif": geotiff(heights(), compression="zlib")}, {}),
-            Sample({"hills.tif": geotiff(heights(), compression="lzw", predictor=3)}, {}),
-        ],
-        "world npz": [Sample({"lab.npz": saved_world()}, {})],
-    }
+_CELL = {"voxel_size_m": 0.5}
+
+SAMPLES: dict[str, Callable[[], list[Sample]]] = {
+    "octomap": lambda: [Sample({f"map{suffix}": octomap_bytes(suffix)}, {}) for suffix in (".bt", ".ot")],
+    "map_server": lambda: [
+        Sample({"map.yaml": YAML, "plan.pgm": pgm(plan())}, {}),
+        Sample({"map.yaml": YAML.replace(b"pgm", b"png"), "plan.png": image(plan())}, {}),
+    ],
+    "image": lambda: [Sample({"plan.png": image(sketch())}, {}), Sample({"plan.pgm": pgm(sketch())}, {})],
+    "height png": lambda: [
+        Sample(
+            {"hills.png": image(plan().astype(np.uint16) * np.uint16(200))},
+            {"resolution_m": 1.0, "elevation_step_m": 0.001},
+        )
+    ],
+    "pcd": lambda: [
+        Sample({"cloud.pcd": pcd(each)}, _CELL) for each in ("ascii", "binary", "binary_compressed")
+    ],
+    "ply": lambda: [
+        Sample({"cloud.ply": ply(True)}, _CELL),
+        Sample({"cloud.ply": ply(False)}, _CELL),
+        Sample({"box.ply": mesh("ply")}, _CELL),
+    ],
+    "obj": lambda: [Sample({"box.obj": mesh("obj")}, _CELL)],
+    "stl": lambda: [Sample({"box.stl": mesh(kind)}, _CELL) for kind in ("stl", "stl_ascii")],
+    "glb": lambda: [Sample({"box.glb": mesh("glb")}, _CELL)],
+    "height npz": lambda: [Sample({"hills.npz": npz(elevation=heights(), spacing_m=np.float64(0.5))}, {})],
+    "geotiff": lambda: [
+        Sample({"hills.tif": geotiff(heights())}, {}),
+        Sample({"hills.tif": geotiff(heights(), compression="zlib")}, {}),
+        Sample({"hills.tif": geotiff(heights(), compression="lzw", predictor=3)}, {}),
+    ],
+    "world npz": lambda: [Sample({"lab.npz": saved_world()}, {})],
+    "las": lambda: [Sample({"scan.las": las(False)}, _CELL), Sample({"scan.laz": las(True)}, _CELL)],
+    "dae": lambda: [Sample({"box.dae": mesh("dae")}, _CELL)],
+    "esri grid": lambda: [Sample({"hills.asc": esri_grid()}, {})],
+    "other images": lambda: [
+        Sample({f"plan.{suffix}": image(sketch(), kind)}, {})
+        for suffix, kind in (("jpg", "JPEG"), ("bmp", "BMP"), ("gif", "GIF"))
+    ],
+}
+"""Format of worlds → its files, of every kind that is read."""

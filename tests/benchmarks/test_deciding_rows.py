@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.deciding import decision_row, floor, floor_row, scanner_row
+from benchmarks.deciding import decision_row, floor_row, scanner_row
 from benchmarks.rows import Effort
 from entropy_explore_env.settings.scenarios import BOX
 
@@ -18,4 +18,4 @@ def test_a_decision_is_measured():
 def test_a_scanner_and_a_mission_are_measured():
     scanner = scanner_row(TINY)
     assert "720 rays" in scanner.job and scanner.goal == "≥ 5000 steps/s" and scanner.ours > 0.0
-    assert floor_row("a small floor", floor((90, 70, 1))).ours > 0.0
+    assert floor_row((240, 200, 1)).ours > 0.0

@@ -13,7 +13,7 @@ import pytest
 
 from baselines.cli.arguments import run_command
 from benchmarks import speed, startup, stepping
-from benchmarks.fusion import Fusion, Measurements, fuse_floor, grid_rows, measure_room
+from benchmarks.fusion import Fusion, Measurements, fusion_row, measure_room
 from benchmarks.rows import Effort, Goal, Row, Taken, alone, compared, interleave, timed
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.grid import Grid
@@ -117,7 +117,7 @@ def test_jobs_take_turns():
 
 def test_end_points_lie_on_the_walls():
     measurements = measure_room(BOX, FEW_RAYS, 5)
-    assert measurements.ends_m.shape == (5, 7 * 4, 3) and measurements.rays == 5 * 28
+    assert measurements.ends_m.shape == (5, 7 * 4, 3)
     low, high = np.asarray(BOX.origin_m), np.asarray(BOX.origin_m) + BOX.size_m
     assert ((measurements.positions_m > low) & (measurements.positions_m < high)).all()
     to_wall = np.minimum(measurements.ends_m - low, high - measurements.ends_m)
@@ -129,44 +129,27 @@ def test_fusion_crosses_the_voxels_of_a_straight_ray():
     start = np.asarray(BOX.origin_m) + 0.5 * np.array([2.5, 3.5, 1.5])
     measurements = Measurements(start[None], (start + np.array([0.0, 2.5, 0.0]))[None, None])
     fusion = Fusion(BOX, RangeSensor((0.0, 0.0), 0.1), measurements)
-    assert fusion.voxels == 7
-    raised = np.flatnonzero(fusion.precision > ROOM.sigma_prior**-2 * 1.01)
+    raised = np.flatnonzero(fusion.belief.precision > ROOM.sigma_prior**-2 * 1.01)
     assert [tuple(int(i) for i in np.unravel_index(v, BOX.shape)) for v in raised] == [
         (2, y, 1) for y in range(3, 10)
     ]
-    assert fusion.mean.reshape(BOX.shape)[2, 4, 1] < 1e-3 < fusion.mean.reshape(BOX.shape)[2, 9, 1]
+    mean = fusion.belief.mean.reshape(BOX.shape)
+    assert mean[2, 4, 1] < 1e-3 < mean[2, 9, 1]
 
 
-def test_floor_adds_precision_to_every_voxel_of_every_ray():
-    mean, precision = np.zeros(6, np.float32), np.ones(6, np.float32)
-    crossed = np.array([0, 1, 1, 4], np.int32)
-    total = fuse_floor(crossed, np.array([2, 4]), np.float32(1.0), mean, precision, 1)
-    np.testing.assert_array_equal(precision, [2, 3, 1, 1, 2, 1])
-    assert total == pytest.approx(1 / 2 * 1 / 2 + 2 / 3 * 1 / 2)
-
-
-def test_rows_of_a_grid_are_measured():
-    rays, voxels = grid_rows(BOX, TINY)
-    assert rays.unit == "rays/s" and rays.goal == "≥ 5 ×" and rays.ours > 0 and rays.theirs
-    assert voxels.unit == "ns" and voxels.goal == "≤ 6 ×" and voxels.ours > 0 and voxels.theirs
+def test_the_row_of_a_grid_is_measured():
+    row = fusion_row(BOX, TINY)
+    assert row.unit == "rays/s" and row.goal == "≥ 5 ×" and row.ours > 0 and row.theirs
 
 
 def test_steps_are_measured_with_full_bursts(monkeypatch):
     monkeypatch.setattr(stepping, "LOOPED", 2)
-    rows = stepping.step_rows(TINY)
-    assert [row.goal for row in rows] == ["≥ 2 ×", "≥ 0.869565 ×", None]
-    assert [row.peer for row in rows] == ["mpe2 simple_spread_v3, N = 4", "exact robots", "batches"]
-    assert all(row.ours > 0 and row.theirs for row in rows)
-    *rows, calls = stepping.vector_rows(TINY)
+    (row,) = stepping.step_rows(TINY)
+    assert row.goal == "≥ 2 ×" and row.peer == "mpe2 simple_spread_v3, N = 4"
+    assert row.ours > 0 and row.theirs
+    rows = stepping.vector_rows(TINY)
     assert [row.goal for row in rows] == [None, "≥ 1.15 ×", "≥ 1.15 ×", "≥ 1.7 ×"]
     assert all(row.ours > 0 and row.theirs for row in rows)
-    assert calls.holds
-
-
-def test_steps_in_larger_worlds_are_measured(monkeypatch):
-    monkeypatch.setattr(stepping, "SHAPES", ((41, 41, 17), (60, 50, 20)))
-    (row,) = stepping.size_rows(TINY)
-    assert row.goal == "≤ 1.5 ×" and row.peer == "28,577 voxels" and row.ours > 0.0
 
 
 def test_bursts_that_are_not_full_are_no_measurement():
@@ -183,8 +166,7 @@ def test_bursts_that_are_not_full_are_no_measurement():
 
 
 def test_first_step_of_a_fresh_process(monkeypatch):
-    step = startup.first_step()
-    assert 0.0 < step.import_s < step.whole_s and 0.0 < step.step_s < step.whole_s - step.import_s
+    assert startup.first_step() > 0.0
     monkeypatch.setattr(startup, "_FIRST_STEP", "raise ValueError('no such room')")
     with pytest.raises(RuntimeError, match="no such room"):
         startup.first_step()

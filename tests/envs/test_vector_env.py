@@ -1,5 +1,7 @@
 """Many missions at once: as Gymnasium's own vector environment would play them, in every autoreset mode."""
 
+import sys
+from types import FrameType
 from typing import Any
 
 import gymnasium
@@ -207,3 +209,26 @@ def test_gymnasium_s_limit_of_steps_cuts_missions_off_only_where_it_is_asked_for
     assert truncated == [[False] * 2, [False] * 2, [True] * 2]
     with pytest.raises(SettingError, match="max_cycles = 0"):
         gymnasium.make_vec(name, 2, max_episode_steps=0)
+
+
+def calls_of_a_step(missions: int) -> int:
+    """Return the calls of Python and C functions in one step."""
+    env = EntropyExploreVectorEnv(BOX, missions)
+    env.reset(seed=0)
+    actions, count = env.action_space.sample(), 0
+    env.step(actions)
+
+    def note(frame: FrameType, event: str, argument: object) -> None:
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    sys.setprofile(note)
+    try:
+        env.step(actions)
+    finally:
+        sys.setprofile(None)
+    return count
+
+
+def test_a_step_of_more_missions_takes_no_more_calls() -> None:
+    assert 0 < calls_of_a_step(16) == calls_of_a_step(64)

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.proofs.files import read_worlds
 from benchmarks.proofs.hostile_worlds import MUTATORS, drawn_octree, mutant
-from benchmarks.proofs.world_samples import samples
+from benchmarks.proofs.world_samples import SAMPLES
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.files.process import kept_reader
 from entropy_explore_env.worlds.load import load_world
@@ -34,19 +34,19 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize("loader", samples())
+@pytest.mark.parametrize("loader", SAMPLES)
 def test_only_worlds_and_named_errors(folder, loader):
     check_loader(loader, FEW, folder)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("loader", samples())
+@pytest.mark.parametrize("loader", SAMPLES)
 def test_only_worlds_and_named_errors_of_many_files(folder, loader):
     check_loader(loader, MANY, folder)
 
 
 def mutants(loader: str, count: int, seed: int) -> list:
-    sources = samples()[loader]
+    sources = SAMPLES[loader]()
     return [mutant(sources, number, np.random.default_rng([seed, number])) for number in range(count)]
 
 
@@ -60,7 +60,7 @@ def test_drawn_octrees_are_read_and_refused(folder):
     """Some are sound, some have a wrong size, some are too deep: all changes are one after the other."""
     causes, loaded = Counter(), 0
     with kept_reader():
-        for source in samples()["octomap"]:
+        for source in SAMPLES["octomap"]():
             name, data = next(iter(source.files.items()))
             for seed in range(60):
                 (folder / name).write_bytes(drawn_octree(data, np.random.default_rng(seed)))

@@ -9,7 +9,7 @@ import re
 import numpy as np
 import pytest
 
-from benchmarks.proofs.world_samples import npz, pgm, samples, sketch
+from benchmarks.proofs.world_samples import SAMPLES, npz, pgm, sketch
 from entropy_explore_env import EntropyExploreEnv, EntropyExploreVectorEnv
 from entropy_explore_env.envs.episodes import require_same, snapshot
 from entropy_explore_env.errors import SettingError, WorldError
@@ -27,10 +27,10 @@ from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box
 
 
-@pytest.mark.parametrize("loader", samples())
+@pytest.mark.parametrize("loader", SAMPLES)
 def test_every_kind_of_file_is_a_world(tmp_path, loader):
     with kept_reader():
-        for sample in samples()[loader]:
+        for sample in SAMPLES[loader]():
             for name, data in sample.files.items():
                 (tmp_path / name).write_bytes(data)
             path = tmp_path / next(iter(sample.files))

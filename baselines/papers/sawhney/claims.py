@@ -90,14 +90,8 @@ def relative(
 ) -> np.ndarray:
     """Return (N,) relative times of a method by world and seed, means over teams; all methods in one order.
 
-    Args:
-        records: By cell.
-        part: `plans` or `terrains`.
-        method: Name of the method.
-        end: Name of a time in a record, or of anything else that is counted there.
-        teams: Team sizes; none = all that were run.
-        worlds: None = all that were run.
-        seeds: Which of them.
+    An end is the name of a time in a record, or of anything else that is counted there. Without teams or
+    worlds all that were run count.
     """
     found = []
     for world in worlds or worlds_in(records, part):

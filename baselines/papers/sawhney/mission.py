@@ -9,12 +9,13 @@ later than the last robot arrives.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 
+from baselines.experiments.mission import run_mission
 from baselines.experiments.rows import Record
 from baselines.papers.sawhney.terrain_model import CEILING_M, model_file
 from baselines.strategies.allocation import ExplorationConfig
@@ -69,33 +70,20 @@ def explore_until_done(
 ) -> tuple[Sequence[float], Sequence[float]]:
     """Run a mission until all robots find nothing unexplored, or it is cut off.
 
-    Args:
-        env: Of the mission.
-        explorer: The robots' strategy.
-        seed: Of the mission.
-
     Returns:
         Times and explored shares after the reset and each step.
     """
-    env.reset(seed=seed)
-    explorer.reset(env.scenario, env.strategy_generator())
-    actions = {agent: np.zeros(env.action_space(agent).shape or (), np.float32) for agent in env.agents}
     times_s, shares = [0.0], [0.0]
-    while env.agents:
-        views = [env.view(agent) for agent in env.deciding_agents()]
-        chosen = [explorer.choose(view) for view in views]
-        over_terrain = views[0].ceiling is not None
-        times_s.append(views[0].time_s)
-        shares.append(
-            explorer.mapped_share()
-            if over_terrain
-            else float(joint_figures(env.missions, 0)["explored"] or 0.0)
-        )
-        if all(explorer.idle):
-            break
-        for view, viewpoint in zip(views, chosen, strict=True):
-            actions[env.agents[view.robot]] = np.asarray(view.action_for(viewpoint))
-        env.step(actions)
+
+    def note(actions: Mapping[str, object]) -> bool:
+        del actions
+        view = env.view(env.deciding_agents()[0])
+        joint = None if view.ceiling is not None else joint_figures(env.missions, 0)
+        times_s.append(view.time_s)
+        shares.append(explorer.mapped_share() if joint is None else float(joint["explored"] or 0.0))
+        return all(explorer.idle)
+
+    run_mission(env, explorer, seed, before_step=note)
     return times_s, shares
 
 

@@ -55,7 +55,7 @@ def test_cases_are_played_with_what_this_process_says_of_assertions(monkeypatch)
 
 
 def test_groups_have_rows_of_their_own():
-    played = {"squares": Played(4, [squares(number) for number in range(3)], {13: "ValueError"})}
+    played = {"squares": Played([squares(number) for number in range(3)], {13: "ValueError"})}
     assert table(played).splitlines()[2:] == [
         "| squares | all | 4 | 1 | 5 squares, 0.25 s at most |",
         "| squares | even | 2 | - | 4 squares, 0.25 s at most |",
@@ -64,7 +64,7 @@ def test_groups_have_rows_of_their_own():
 
 
 def test_the_page_says_what_each_proof_is(tmp_path):
-    write_page(tmp_path / "page.md", {"squares": Played(1, [squares(1)], {})}, ["--full"])
+    write_page(tmp_path / "page.md", {"squares": Played([squares(1)], {})}, ["--full"])
     text = (tmp_path / "page.md").read_text("utf-8")
     assert all(f"- **{name}**: " in text for name in PROOFS)
     assert len(text.split()) < 1500

@@ -35,10 +35,10 @@ def test_a_digest_made_right_again_lets_a_change_through_and_one_that_is_not_doe
     for name, content in changed.items():
         (folder / name).write_bytes(content)
     with pytest.raises(EntropyExploreError, match="whole and unchanged"):
-        made.load(folder)
+        made.load(folder / next(iter(made.files)))
     for name, content in made.repair(changed).items():
         (folder / name).write_bytes(content)
-    made.load(folder)
+    made.load(folder / next(iter(made.files)))
 
 
 def test_what_is_wrong_is_said():
@@ -49,13 +49,13 @@ def test_what_is_wrong_is_said():
 
 
 def test_an_error_without_a_name_and_a_slow_file_are_found(tmp_path):
-    def raises(folder):
+    def raises(path):
         raise KeyError("x")
 
     saved = SAVED["record"](tmp_path)
-    reads = read_changed(saved._replace(load=raises), tmp_path / "changed", 2, 0, 5.0)
+    reads = read_changed(saved.changed, raises, tmp_path / "changed", 2, 0, 5.0)
     assert len(reads.wrong) == 2 and "KeyError: 'x'" in reads.wrong[0]
-    reads = read_changed(saved._replace(load=lambda folder: None), tmp_path / "changed", 1, 0, -1.0)
+    reads = read_changed(saved.changed, lambda path: None, tmp_path / "changed", 1, 0, -1.0)
     assert reads.loaded == 1 and len(reads.wrong) == 1
 
 

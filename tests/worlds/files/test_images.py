@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from benchmarks.proofs.world_samples import pgm, png
+from benchmarks.proofs.world_samples import image, pgm
 from entropy_explore_env.errors import SettingError, WorldError, WorldWarning
 from entropy_explore_env.worlds.load import load_world
 
@@ -23,7 +23,7 @@ def load(tmp_path, data, name="plan.png", **options):
 def test_dark_is_solid_and_the_last_row_is_the_lowest(tmp_path):
     shades = np.full((5, 7), 230, np.uint8)
     shades[4, 1], shades[0, 6], shades[2, 3], shades[2, 4] = 0, 60, 127, 128  # half of white is 127.5
-    for name, data in (("plan.png", png(shades)), ("plan.PGM", pgm(shades))):
+    for name, data in (("plan.png", image(shades)), ("plan.PGM", pgm(shades))):
         world = load(tmp_path, data, name)
         assert world.grid.shape == (7, 5, 1)
         assert (world.grid.voxel_size_m, world.grid.origin_m) == (0.05, (0.0, 0.0, 0.0))
@@ -39,7 +39,7 @@ def test_colours_are_averaged_and_transparent_pixels_are_unknown(tmp_path):
     pixels[0, 0, :3] = (255, 128, 0)  # 127.7
     pixels[0, 1, :3] = (255, 126, 0)  # 127
     pixels[1, 2, 3] = 254
-    world = load(tmp_path, png(pixels))
+    world = load(tmp_path, image(pixels))
     assert np.argwhere(world.occupied).tolist() == [[1, 1, 0], [2, 0, 0]]
     assert np.argwhere(world.unknown).tolist() == [[2, 0, 0]]
 
@@ -48,15 +48,15 @@ def test_grey_walls_are_told_and_a_limit_makes_them_solid(tmp_path):
     shades = np.full((5, 8), 255, np.uint8)
     shades[:, 3] = 150
     with pytest.warns(WorldWarning, match="grey pixels, of shades from 90 to 204, 5 count as free"):
-        assert not load(tmp_path, png(shades)).occupied.any()
-    world = load(tmp_path, png(shades), occupied_below=200)
+        assert not load(tmp_path, image(shades)).occupied.any()
+    world = load(tmp_path, image(shades), occupied_below=200)
     assert np.unique(np.nonzero(world.occupied)[0]).tolist() == [3]
-    some = load(tmp_path, png(shades), free_above=200)
+    some = load(tmp_path, image(shades), free_above=200)
     assert some.unknown is not None and (some.unknown == world.occupied).all()
     with pytest.warns(WorldWarning, match="cropped from 2000 × 600"):
         large = np.full((600, 2000), 150, np.uint8)
         large[100:110, 40:60] = 255
-        assert load(tmp_path, png(large), occupied_below=200).grid.origin_m == (39 * 0.05, 489 * 0.05, 0.0)
+        assert load(tmp_path, image(large), occupied_below=200).grid.origin_m == (39 * 0.05, 489 * 0.05, 0.0)
 
 
 @pytest.mark.parametrize("kind", ["PNG", "PPM", "JPEG", "BMP", "GIF"])
@@ -88,25 +88,25 @@ def test_every_mode_of_pixels_is_read(tmp_path, mode):
 def test_a_plan_is_resampled_and_extruded(tmp_path):
     shades = np.full((6, 8), 255, np.uint8)
     shades[:, 3] = 0  # a wall one pixel thick
-    world = load(tmp_path, png(shades), voxel_size_m=0.1, height_m=0.3, resolution_m=0.05)
+    world = load(tmp_path, image(shades), voxel_size_m=0.1, height_m=0.3, resolution_m=0.05)
     assert world.grid.shape == (4, 3, 3)
     assert world.occupied[1].all()
     assert not world.occupied[[0, 2, 3]].any()
     with pytest.raises(SettingError, match=r"height_m = 0\.1: expected from 2 to"):
-        load(tmp_path, png(shades), voxel_size_m=0.1, height_m=0.1)
+        load(tmp_path, image(shades), voxel_size_m=0.1, height_m=0.1)
 
 
 def test_a_16_bit_png_is_a_height_map(tmp_path):
     """Counts of 0.5 m: 0, 2 and 5 m; from -1 m on, layers of 1 m below the surface: 1, 3 and 6."""
     counts = np.array([[0, 4, 10], [0, 4, 10]], np.uint16)
-    world = load(tmp_path, png(counts), resolution_m=1.0, elevation_step_m=0.5, clearance_m=2.0)
+    world = load(tmp_path, image(counts), resolution_m=1.0, elevation_step_m=0.5, clearance_m=2.0)
     assert world.grid.shape == (3, 2, 8)
     assert world.grid.origin_m == (0.0, 0.0, -1.0)
     assert world.occupied.sum(axis=2).tolist() == [[1, 1], [3, 3], [6, 6]]
     with pytest.raises(SettingError, match="resolution_m = None"):
-        load(tmp_path, png(counts))
+        load(tmp_path, image(counts))
     with pytest.raises(SettingError, match="negate = True: expected None"):
-        load(tmp_path, png(counts), resolution_m=1.0, negate=True)
+        load(tmp_path, image(counts), resolution_m=1.0, negate=True)
 
 
 def bomb(edge):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.proofs.world_samples import YAML, pgm, plan, png
+from benchmarks.proofs.world_samples import YAML, image, pgm, plan
 from entropy_explore_env.errors import SettingError, WorldError, WorldWarning
 from entropy_explore_env.worlds.files.map_server import labelling
 from entropy_explore_env.worlds.load import load_world
@@ -84,7 +84,7 @@ def test_the_lower_left_pixel_is_the_first_voxel(tmp_path):
 @pytest.mark.parametrize("suffix", [".yaml", ".YML"])
 def test_png_and_pgm_give_the_same_world(tmp_path, suffix):
     first = load_world(write(tmp_path, image=pgm(plan())))
-    (tmp_path / "plan.PNG").write_bytes(png(plan()))
+    (tmp_path / "plan.PNG").write_bytes(image(plan()))
     path = tmp_path / f"other{suffix}"
     path.write_bytes(YAML.replace(b"plan.pgm", b"plan.PNG"))
     np.testing.assert_array_equal(load_world(path).occupied, first.occupied)
@@ -101,14 +101,14 @@ def test_opacity_is_averaged_in_trinary_mode_by_the_old_rule_only(tmp_path):
     pixels[0, 1:, :3] = 255
     pixels[1, :, :3] = 150
     yaml = YAML.replace(b"plan.pgm", b"plan.png").replace(b"free_thresh: 0.196", b"free_thresh: 0.35")
-    path = write(tmp_path, yaml, png(pixels), "plan.png")
+    path = write(tmp_path, yaml, image(pixels), "plan.png")
     trinary = load_world(path, map_rule="map_server")
     assert trinary.occupied[:, :, 0].tolist() == [[False, True], [False, False], [False, False]]
     with pytest.warns(WorldWarning, match="grey pixels, of shades from 90 to 204, 3 count as unknown"):
         now = load_world(path)
     assert now.occupied[:, :, 0].tolist() == [[True, True], [True, False], [True, False]]
     assert now.unknown is not None and now.unknown.sum() == 3
-    raw = load_world(write(tmp_path, yaml.replace(b"trinary", b"raw"), png(pixels[:, :, :3]), "plan.png"))
+    raw = load_world(write(tmp_path, yaml.replace(b"trinary", b"raw"), image(pixels[:, :, :3]), "plan.png"))
     assert raw.occupied[:, :, 0].tolist() == [[True, False], [True, True], [True, True]]
 
 
@@ -216,12 +216,12 @@ def test_opaque_alpha_changes_nothing_and_any_transparency_is_unknown(tmp_path):
     yaml = YAML.replace(b"plan.pgm", b"plan.png")
     first = load_world(write(tmp_path, YAML, pgm(house())))
     pixels = np.stack((house(), np.full_like(house(), 255)), axis=2)
-    again = load_world(write(tmp_path, yaml, png(pixels), "plan.png"))
+    again = load_world(write(tmp_path, yaml, image(pixels), "plan.png"))
     np.testing.assert_array_equal(again.occupied, first.occupied)
     np.testing.assert_array_equal(again.unknown, first.unknown)
     pixels[5:8, 2:8, 1] = 254
     with pytest.raises(WorldError, match="18 pixels that are not wholly opaque count as unknown"):
-        load_world(write(tmp_path, yaml, png(pixels), "plan.png"))
+        load_world(write(tmp_path, yaml, image(pixels), "plan.png"))
 
 
 def test_large_margins_are_cropped_and_places_stay(tmp_path):

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.proofs.world_samples import mesh, octomap_bytes, pgm, png, saved_world, sketch
+from benchmarks.proofs.world_samples import image, mesh, octomap_bytes, pgm, saved_world, sketch
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.files import process
 from entropy_explore_env.worlds.files.process import Format, Limits, ReaderProcess, kept_reader
@@ -120,7 +120,7 @@ def as_on_windows(monkeypatch):
 @pytest.mark.parametrize(
     ("name", "data", "shape"),
     [
-        ("plan.png", lambda: png(sketch()), (11, 7, 1)),
+        ("plan.png", lambda: image(sketch()), (11, 7, 1)),
         ("world.npz", saved_world, (7, 11, 5)),
         ("tree.bt", lambda: octomap_bytes(".bt"), None),
     ],
