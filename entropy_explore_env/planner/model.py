@@ -7,6 +7,7 @@ voxels, K candidates, M teammates, N viewpoints of the pool, F viewpoints at far
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -95,6 +96,7 @@ class Proposer(NamedTuple):
     view_rad: tuple[float, float]  # Width and height of the sensor's view
     view_width_rad: float  # The larger one of them, and no less than the angle between two rays
     refined_rad: float  # Standard deviation by which refined gazes differ at first
+    least_s: float  # Shortest time that a viewpoint counts with
     target_precision: float  # 1/σ² of a voxel at which nothing remains to be gained
     unknown_cost: float  # Traversal cost of unknown voxels
     blocks: Blocks
@@ -160,6 +162,15 @@ def new_proposers(scenario: Scenario, recipe: Recipe | None = None) -> list[Prop
     return [_proposer(scenario, kind, of_kind, scratch) for kind, of_kind in pairs]
 
 
+def _least_seconds(kind: RobotKind) -> float:
+    """Return the shortest time that a viewpoint counts with: to brake, and to come to full speed again.
+
+    A robot that scans under way loses it wherever it stands; for others all scans are taken standing.
+    """
+    under_way, robot = math.isfinite(kind.sensor.scan_every_m), kind.robot
+    return 2.0 * robot.max_speed_m_s / robot.acceleration_m_s2 if under_way else 0.0
+
+
 def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: ProposalScratch) -> Proposer:
     grid, robot, sensor = scenario.grid, kind.robot, kind.sensor
     drawn, exact = (
@@ -186,6 +197,7 @@ def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: Prop
         view_rad=(float(width), float(height)),
         view_width_rad=float(max(width, height, sensor.angular_step_rad)),
         refined_rad=float(angular_spread(kind)),
+        least_s=_least_seconds(kind),
         target_precision=min(float(scenario.ending.sigma_end**-2), exact.scan.wanted_precision),
         unknown_cost=float(robot.unknown_cost),
         blocks=new_blocks(grid.shape, _block_edge(scenario, recipe)),

@@ -88,6 +88,22 @@ def test_refining_never_loses_the_best():
     assert best == sorted(best) and best[-1] > best[0]
 
 
+@pytest.mark.parametrize(("sensor", "least_s"), [({}, 0.0), ({"scan_every_m": 0.2}, 5.0)])
+def test_where_scans_are_taken_under_way_standing_counts_with_the_time_to_stop_and_start(sensor, least_s):
+    """0.5 m/s at 0.2 m/s²: 2.5 s to brake, 2.5 s to come to speed again."""
+    robot = {"max_speed_m_s": 0.5, "acceleration_m_s2": 0.2}
+    proposer, situation = (
+        new_proposers(with_settings(PLAN, {"robot": robot, "sensor": sensor}))[0],
+        half_known_plan(),
+    )
+    situation.experience["exponent"] = 0.7
+    start_paths(proposer, situation)
+    pool = proposer.scratch.pool[: propose_nearby(proposer, situation)]
+    seconds = np.maximum(pool["seconds"], least_s)
+    assert (pool["seconds"] < 5.0).any() and (pool["kind"] == Kind.SPOT).any()
+    np.testing.assert_allclose(pool["value"], pool["bits"] / seconds**0.7)
+
+
 @pytest.fixture
 def far():
     """A proposer and a situation, after far places were proposed, the goal of the robot among them."""
