@@ -89,9 +89,9 @@ def main(words: Sequence[str]) -> int:
 
 
 def beside_each_other(films: Sequence[Film], names: Sequence[str], width: int) -> Iterator[np.ndarray]:
-    """Yield pictures (H, W, 3) uint8 of several missions on one clock, each under its name, width in pixels.
+    """Yield pictures (H, W, 3) uint8 of several missions on one clock, each under its name.
 
-    The film of a mission that is over stands still.
+    Each mission's picture is `width` pixels wide; the film of a mission that is over stands still.
     """
     longest = max(films, key=lambda film: film.times_s[-1])
     for time_s in [*longest.times_s, *[longest.times_s[-1]] * (_LAST - 1)]:

@@ -14,10 +14,10 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, ClassVar
 
 from baselines.cli.arguments import parse, run_command
 from baselines.cli.interruption import Interruption
@@ -77,17 +77,13 @@ def main(words: Sequence[str]) -> int:
     title = f"{args.scenario}, {shown_name(name)}"
     with log, progress_bar(title, hidden=args.output.json) as show:
 
-        def after_step(env: EntropyExploreEnv) -> None:
+        def after_step(env: EntropyExploreEnv) -> bool:
             log.note(env)
             show(env)
-
-        def before_step(actions: Mapping[str, Any]) -> bool:
-            if not interruption.asked:
-                log.command(actions)
             return interruption.asked
 
         with Interruption(_PROMISE) as interruption:
-            run_mission(env, strategy, args.seed, after_step, before_step)
+            run_mission(env, strategy, args.seed, after_step, log.command)
         figures, written = log.finish(name)
     if args.task.world and env.scenario.grid.flat and not task.scenario.grid.flat:
         plan = f"{args.task.world[0]} is one voxel high: robots stayed in its plane and looked level"

@@ -96,19 +96,19 @@ def run_mission(
     env: EntropyExploreEnv,
     strategy: Strategy,
     seed: int,
-    after_step: Callable[[EntropyExploreEnv], None] | None = None,
+    after_step: Callable[[EntropyExploreEnv], bool | None] | None = None,
     before_step: Callable[[Mapping[str, Any]], bool | None] | None = None,
     options: dict[str, Any] | None = None,
     backs_off: bool = True,
 ) -> None:
-    """Reset the environment and let a strategy act until the mission is over.
+    """Reset the environment and let a strategy act until the mission is over or left.
 
     Args:
         env: With any settings; it is left at the mission's end.
         strategy: Chooses the viewpoints.
         seed: Of the mission.
-        after_step: Called after the reset and after every step.
-        before_step: Called with the actions before every step; where it returns True the mission is left.
+        after_step: Called after the reset and after every step; where it returns True the mission is left.
+        before_step: Called with the actions before every step; the same holds.
         options: Of the reset: where the robots start, and in which world.
         backs_off: Whether robots that drift back off from what blocks them: see `planner.driver`.
     """
@@ -119,9 +119,8 @@ def run_mission(
         strategy = Followed(strategy)
     strategy.reset(env.scenario, env.strategy_generator())
     actions = {agent: _idle_action(env, agent) for agent in env.agents}
-    if after_step is not None:
-        after_step(env)
-    while env.agents:
+    left = after_step is not None and after_step(env)
+    while env.agents and not left:
         views = [env.view(agent) for agent in env.deciding_agents()]
         chosen = choose_all(strategy, views)
         for view, viewpoint in zip(views, chosen, strict=True):
@@ -129,8 +128,7 @@ def run_mission(
         if before_step is not None and before_step(actions):
             return
         env.step(actions)
-        if after_step is not None:
-            after_step(env)
+        left = after_step is not None and after_step(env)
 
 
 class Followed(Driver):

@@ -23,7 +23,7 @@ def printed_results(results: Results) -> dict[str, Any]:
 
 
 def show_results(results: Results, refused: Sequence[str], tables: bool) -> None:
-    """Print a table over all tasks, or of each task in Markdown as well, what failed and what was refused."""
+    """Print a table over all tasks, what failed, what was refused, and with `tables` a table of each task."""
     if tables:
         print(tasks_table(results))
     own = results.suite.name == "own"

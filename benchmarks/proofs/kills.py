@@ -42,8 +42,8 @@ def kill_sweep(folder: Path, moments: random.Random) -> list[int]:
             lambda target=target: len(_missions(folder)) >= target, moments.uniform(0.0, 0.01)
         )
         kept.append(len(_missions(folder)))
-        if kept != sorted(kept):
-            raise BrokenPromiseError(f"a mission was lost: {kept}")
+        if kept != sorted(kept) or kept[-1] >= _MISSIONS:
+            raise BrokenPromiseError(f"a mission was lost, or the sweep ended before its kill: {kept}")
     _sweep(folder).finish()
     found = contents(folder)
     differing = [name for name in expected.keys() | found.keys() if expected.get(name) != found.get(name)]

@@ -89,7 +89,7 @@ def _fill_far(proposer, situation, state, options):
                     _put_at(proposer, situation, place, at)
                     cost = cost_of(proposer, situation, at)
                     seconds = travel_seconds(drive, edge_m, here, at, cost, proposer.reach)
-                    worth = value_of(situation, bits, seconds)
+                    worth = value_of(proposer, situation, bits, seconds)
                     if state == _DEPLETED:
                         worth *= draw_uniform(rng)
                     count = _insert(worths, options, at, worth, count)
@@ -135,7 +135,7 @@ def propose_far(proposer, situation, state):
         for number in range(count):
             best = max(best, far[number].value)
         seconds = max(radius * proposer.exact.voxel_size_m / proposer.drive.max_speed_m_s, 1e-9)
-        if radius >= everywhere or best >= value_of(situation, experience.most_bits, seconds):
+        if radius >= everywhere or best >= value_of(proposer, situation, experience.most_bits, seconds):
             return count, best
         radius = 2.0 * radius if proposer.lattice.edge == 1 else everywhere
 

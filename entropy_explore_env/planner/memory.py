@@ -137,9 +137,11 @@ def weigh_time(recipe, experience, knowledge):
 
 
 @lean_kernel
-def value_of(situation, bits, seconds):
-    """Return bits / s^c; 0 where there is no path."""
-    return bits / seconds**situation.experience.exponent if seconds < math.inf else 0.0
+def value_of(proposer, situation, bits, seconds):
+    """Return bits / s^c, with the least time that counts; 0 where there is no path."""
+    if seconds == math.inf:
+        return 0.0
+    return bits / max(seconds, proposer.least_s) ** situation.experience.exponent
 
 
 @lean_kernel

@@ -96,7 +96,7 @@ class Proposer(NamedTuple):
     view_rad: tuple[float, float]  # Width and height of the sensor's view
     view_width_rad: float  # The larger one of them, and no less than the angle between two rays
     refined_rad: float  # Standard deviation by which refined gazes differ at first
-    least_s: float  # Shortest time that a viewpoint counts with
+    least_s: float  # Shortest time, in seconds, by which bits are divided
     target_precision: float  # 1/σ² of a voxel at which nothing remains to be gained
     unknown_cost: float  # Traversal cost of unknown voxels
     blocks: Blocks
@@ -163,9 +163,9 @@ def new_proposers(scenario: Scenario, recipe: Recipe | None = None) -> list[Prop
 
 
 def _least_seconds(kind: RobotKind) -> float:
-    """Return the shortest time that a viewpoint counts with: to brake, and to come to full speed again.
+    """Return the shortest time by which bits are divided: to brake, and to come to full speed again.
 
-    A robot that scans under way loses it wherever it stands; for others all scans are taken standing.
+    A robot that scans under way loses this time wherever it stands; others take all scans standing.
     """
     under_way, robot = math.isfinite(kind.sensor.scan_every_m), kind.robot
     return 2.0 * robot.max_speed_m_s / robot.acceleration_m_s2 if under_way else 0.0
@@ -197,7 +197,7 @@ def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: Prop
         view_rad=(float(width), float(height)),
         view_width_rad=float(max(width, height, sensor.angular_step_rad)),
         refined_rad=float(angular_spread(kind)),
-        least_s=_least_seconds(kind),
+        least_s=float(_least_seconds(kind)),
         target_precision=min(float(scenario.ending.sigma_end**-2), exact.scan.wanted_precision),
         unknown_cost=float(robot.unknown_cost),
         blocks=new_blocks(grid.shape, _block_edge(scenario, recipe)),

@@ -150,7 +150,7 @@ def evaluate(proposer, situation, scan, options, far):
         if option.seconds < math.inf:
             bits = expected_bits(belief, scan, at, scratch.scan)
         option.bits = option.stop_bits = worth_bits(proposer, situation, at, bits)
-        option.value = value_of(situation, option.bits, max(option.seconds, proposer.least_s))
+        option.value = value_of(proposer, situation, option.bits, option.seconds)
         moved = at[0] != here[0] or at[1] != here[1] or at[2] != here[2]
         option.kind = _NEAR if moved else _SPOT
         copy_numbers(at, option.goal)

@@ -20,6 +20,7 @@ from entropy_explore_env.planner.memory import (
     learn,
     trust_and_clearance,
     weigh_time,
+    worth_bits,
 )
 from entropy_explore_env.planner.nearby import (
     cost_of,
@@ -258,6 +259,9 @@ def _keep_target(proposer, situation, number):
         at[axis] = min(max(at[axis], 0.0), float(situation.belief.size[axis]))
     _pull_within(proposer, knowledge.pose, at)
     evaluate(proposer, situation, proposer.exact, options, False)
+    if options[0].seconds == math.inf:  # what came is still compared with what its scan should bring
+        bits = expected_bits(situation.belief, proposer.exact, at, proposer.scratch.scan)
+        options[0].bits = options[0].stop_bits = worth_bits(proposer, situation, at, bits)
     if experience.going:
         copy_numbers(experience.goal, options[0].goal)
         options[0].kind = _FAR

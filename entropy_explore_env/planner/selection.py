@@ -84,7 +84,7 @@ def _take(proposer, situation, number, count, marked, most_common):
     marked = mark_view(proposer, belief, count, marked)
     if option.seconds < math.inf:  # put what all rays should bring in place of what fewer should
         option.bits = worth_bits(proposer, situation, option.goal, scratch.views[count].bits)
-        option.value = value_of(situation, option.bits, option.seconds)
+        option.value = value_of(proposer, situation, option.bits, option.seconds)
         if option.kind != _FAR:
             option.stop_bits = option.bits
     return count + 1, marked

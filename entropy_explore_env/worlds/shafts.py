@@ -38,6 +38,7 @@ class Blocks(NamedTuple):
 
     left: np.ndarray  # (_LEVELS, B) int64, their numbers
     count: np.ndarray  # (_LEVELS,) int64
+    voxel: np.ndarray  # (1,) int64, number of the voxel; -1 = none yet
 
 
 def box_order(voxels: np.ndarray) -> np.ndarray:
@@ -57,7 +58,7 @@ def places_in_blocks(places: np.ndarray) -> Places:
 
 def new_blocks(places: Places) -> Blocks:
     """Return memory for the blocks that are left over."""
-    return Blocks(np.zeros((_LEVELS, len(places.low)), np.int64), np.zeros(_LEVELS, np.int64))
+    return Blocks(np.zeros((_LEVELS, len(places.low)), np.int64), np.zeros(_LEVELS, np.int64), np.full(1, -1))
 
 
 def free_counts(free: np.ndarray) -> np.ndarray:
@@ -150,14 +151,15 @@ def narrow_blocks(counts, places, squared_range, voxels, number, blocks):
         places: Places.
         squared_range: Square of the sensor's range, in voxel edges.
         voxels: (N, 3) int64, in the order of `box_order`.
-        number: Number of the voxel; that of the call before was one less, or this is the first call.
-        blocks: Blocks of the call before, changed in place.
+        number: Number of the voxel.
+        blocks: Blocks for a voxel before it, changed in place.
     """
-    same = number > 0
+    former, same = blocks.voxel[0], blocks.voxel[0] >= 0
+    blocks.voxel[0] = number
     for level in range(_LEVELS):
         shift = SINGLE - level
         for axis in range(3):
-            same = same and voxels[number, axis] >> shift == voxels[number - 1, axis] >> shift
+            same = same and voxels[number, axis] >> shift == voxels[former, axis] >> shift
         if not same:
             x, y, z = voxels[number, 0] >> shift, voxels[number, 1] >> shift, voxels[number, 2] >> shift
             low = x << shift, y << shift, z << shift

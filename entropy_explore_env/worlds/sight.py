@@ -26,7 +26,7 @@ _BESIDE = 1.5
 """Voxel edges from what a body touches to the centre of the voxel beside it, diagonals included."""
 _NEAR = 8.0
 """Distance, in voxel edges, up to which places are tried one by one; farther ones are ruled out in blocks."""
-_AT_ONCE = 4096
+_AT_ONCE = 256
 """Number of voxels that are looked at in one compiled call: signals are handled between calls."""
 _Starts = tuple[tuple[int, int, int], ...]
 """Voxels in which robots start."""
@@ -180,20 +180,28 @@ def _look_far(voxels, first, last, places, free, counts, squared_range, blocks, 
         blocks: Blocks.
         found: (N,) bool; filled.
     """
+    latest = 0  # a place from which one voxel is visible often shows the next one, too
     for n in range(first, last):
-        voxel = voxels[n, 0], voxels[n, 1], voxels[n, 2]
+        if _is_seen(voxels[n], places.voxels[latest], free, squared_range):
+            found[n] = True
+            continue
         narrow_blocks(counts, places, squared_range, voxels, n, blocks)
         for number in range(blocks.count[SINGLE]):
             block = blocks.left[SINGLE, number]
             for m in range(places.first[block], places.first[block + 1]):
-                place = places.voxels[m]
-                step = place[0] - voxel[0], place[1] - voxel[1], place[2] - voxel[2]
-                squared = step[0] * step[0] + step[1] * step[1] + step[2] * step[2]
-                if squared <= squared_range and _is_open(free, voxel, step):
-                    found[n] = True
+                if _is_seen(voxels[n], places.voxels[m], free, squared_range):
+                    found[n], latest = True, m
                     break
             if found[n]:
                 break
+
+
+@lean_kernel
+def _is_seen(voxel, place, free, squared_range):
+    """Return whether a voxel (3,) is visible from a place (3,) and within range."""
+    step = place[0] - voxel[0], place[1] - voxel[1], place[2] - voxel[2]
+    squared = step[0] * step[0] + step[1] * step[1] + step[2] * step[2]
+    return squared <= squared_range and _is_open(free, (voxel[0], voxel[1], voxel[2]), step)
 
 
 @lean_kernel
