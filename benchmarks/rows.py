@@ -46,8 +46,8 @@ class Effort:
         long_rounds: Rounds of jobs that may take seconds.
         steps: Steps of an environment in a round.
         missions: Missions E of the vector environments.
-        starts: Fresh processes, of each version where there are two.
-        large: Whether what takes minutes or gigabytes is measured, too.
+        starts: Fresh processes.
+        large: Whether what takes minutes is measured, too.
     """
 
     scans: int = 400

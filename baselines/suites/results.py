@@ -92,7 +92,7 @@ class Results:
     ) -> np.ndarray:
         """Return (N,) float64 a measure of each mission; its limit where the mission never came that far.
 
-        Missions are numbers of some that were run; None = all of these.
+        `missions` are numbers of missions that were run; None = all of them.
         """
         limit, records = measure.limit(task.scenario), self.numbered(task, strategy)
         found = [measure.value(records[number]) for number in (records if missions is None else missions)]

@@ -69,7 +69,7 @@ def first_allowed(number: int, few_kernels: bool) -> tuple[Drawn, int]:
 
 
 def draw_scenario(rng: np.random.Generator, few_kernels: bool = False) -> Drawn:
-    """Draw all settings of a scenario, or with few kernels those that need no others: they compile slowly."""
+    """Draw all settings of a scenario; with few kernels only those that need no further kernels."""
     grid, given = _grid(rng), rng.random() < 0.3
     world = "empty" if given or rng.random() < 0.5 else str(rng.choice(sorted(RECIPES)))
     robot: dict[str, Any] = {

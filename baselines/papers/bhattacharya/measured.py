@@ -54,7 +54,7 @@ def unknown_region(name: str) -> np.ndarray:
 
 
 def split(name: str, eta: float | None) -> Split:
-    """Tessellate a convex plan with a region, by entropy-weighted cells of an η, or without by plain ones."""
+    """Tessellate a convex plan with a region: into entropy-weighted cells for an η, else into plain ones."""
     region, space = unknown_region(name), new_tessellation(SHAPE)
     sources = np.array([x * SHAPE[1] + y for x, y in ROBOTS])
     if eta is None:
