@@ -39,7 +39,7 @@ from baselines.suites.own import (
     world_tasks,
 )
 from baselines.suites.results import results_of, run_suite
-from baselines.suites.suite import BASELINE, REFERENCE, Suite
+from baselines.suites.suite import BASELINE, Suite
 from entropy_explore_env.errors import SettingError, one_of
 from entropy_explore_env.settings.scenarios import SCENARIOS
 from entropy_explore_env.settings.validation import check_whole
@@ -73,7 +73,7 @@ class Args(TrialOptions):
     )
 
     suite: str | None = None
-    """Pinned worlds and starts: plans, volumes, teams, others, c2 or faults."""
+    """Pinned worlds and starts: plans, volumes, teams, others, c2, faults or prediction."""
     scenarios: str | None = None
     """Named scenarios, separated by commas, in place of a suite; options of the task change each of them.
     Default: room,room-furnished,lab,office,cave, or the scenario in --settings. With --world alone every
@@ -253,10 +253,8 @@ def chosen_strategies(words: str | None, suite: Suite | None = None, alone: bool
         make_strategy(name)
     if suite is None:
         added = [BASELINE]
-    elif alone or suite.name == "faults":
-        added = []
     else:
-        added = [REFERENCE]
+        added = [] if alone or suite.name == "faults" else [suite.reference]
     return tuple(dict.fromkeys([*added, *map(resolved, names)]))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from baselines.experiments.rows import Record
 from baselines.strategies import make_strategy
-from baselines.strategies.protocol import Stopwatch, Strategy, choose_all
+from baselines.strategies.protocol import Bound, Stopwatch, Strategy, choose_all
 from entropy_explore_env.compilation.announcement import compiling_s
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import RobotView
@@ -226,7 +226,10 @@ class SuiteMission:
             took for one robot (median and largest, without compiling and without the first decision, which
             loads what is compiled), and `mission_s`.
         """
-        timed, started = Stopwatch(make_strategy(strategy), _clock_s), time.perf_counter()
+        made = make_strategy(strategy)
+        if isinstance(made, Bound):
+            made.tell(env)
+        timed, started = Stopwatch(made, _clock_s), time.perf_counter()
         if file is None:
             run_mission(env, timed, seed, options=self.options)
         else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -12,7 +12,10 @@ from entropy_explore_env.frontiers.knowledge import random_viewpoint
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.settings.scenario import Scenario
 
-__all__ = ["Stopwatch", "Strategy", "choose_all", "random_viewpoint"]
+if TYPE_CHECKING:
+    from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+
+__all__ = ["Bound", "Stopwatch", "Strategy", "choose_all", "random_viewpoint"]
 
 
 class Strategy(Protocol):
@@ -42,6 +45,15 @@ class Strategy(Protocol):
         Returns:
             (5,) viewpoint: x, y, z, yaw, pitch; map frame, metres, radians.
         """
+        ...
+
+
+@runtime_checkable
+class Bound(Protocol):
+    """A strategy that is told the truth: what others could reach, never a rival."""
+
+    def tell(self, env: EntropyExploreEnv) -> None:
+        """Tell it of the environment in which it will act."""
         ...
 
 

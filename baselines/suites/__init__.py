@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from baselines.strategies.table import suite_names
-from baselines.suites import c2, faults, scoreboard
+from baselines.suites import c2, faults, prediction, scoreboard
 from baselines.suites.suite import PATH, TIME_99, Suite
 from entropy_explore_env.errors import SettingError, one_of
 
@@ -40,10 +40,18 @@ SUITES: dict[str, Callable[[bool], Suite]] = {
         faults.STRATEGIES,
         later=faults.later_tasks,
     ),
+    "prediction": lambda quick: Suite(
+        "prediction",
+        "Plans with a predicted map",
+        prediction.tasks(quick),
+        prediction.STRATEGIES,
+        prediction.MEASURES,
+        reference=prediction.UNPREDICTED,
+    ),
 }
 """Name → what makes the suite, quick or whole, with the strategies of its table."""
 SCOREBOARD = ("plans", "volumes", "teams", "others", "c2")
-"""Suites that stand on one page; the other one has a page of its own."""
+"""Suites that stand on one page; each other one has a page of its own."""
 
 
 def find_suite(name: str, quick: bool = False, strategies: Sequence[str] | None = None) -> Suite:

@@ -18,6 +18,7 @@ from baselines.strategies import shown_names
 from baselines.suites import SCOREBOARD, entries, find_suite
 from baselines.suites.faults import CONDITIONS, LOST_ISOLATED, NOTHING_FAILS, Times, all_claims
 from baselines.suites.figures import fault_figure, task_figure
+from baselines.suites.prediction import bounds_table
 from baselines.suites.results import Results, Row, failed_rows, overall_rows, results_of, task_rows
 from baselines.suites.suite import REFERENCE, Measure, Task
 from entropy_explore_env.errors import counted
@@ -69,6 +70,9 @@ def write_page(
             "cut": sum(not record.get("finished", False) for record in times.all_records()),
             "seeds": max(map(len, results.records.values())),
         }
+    elif name == "prediction":
+        figures, tables = {}, {"bounds": partial(bounds_table, results)}
+        texts |= part_texts(results, rows)
     else:
         figures = {"tasks": partial(task_figure, results)}
         tables = {"overall": partial(overall_table, results), "tasks": partial(tasks_table, results)}

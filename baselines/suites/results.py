@@ -20,7 +20,7 @@ from baselines.experiments.rows import Record
 from baselines.experiments.statistics import Interval, geometric_ratio_interval, median_interval
 from baselines.experiments.trials import Cell, CellTrial, How, run_trials
 from baselines.suites.public_worlds import fetch_worlds
-from baselines.suites.suite import BASELINE, REFERENCE, Measure, Records, Suite, Task
+from baselines.suites.suite import BASELINE, Measure, Records, Suite, Task
 from entropy_explore_env.errors import MissingExtraError, SettingError
 
 MARKS = (
@@ -53,7 +53,8 @@ class Results:
     @property
     def reference(self) -> str:
         """The strategy to which ratios are relative."""
-        return REFERENCE if REFERENCE in self.suite.strategies else BASELINE
+        suite = self.suite
+        return suite.reference if suite.reference in suite.strategies else BASELINE
 
     @property
     def ran(self) -> tuple[str, ...]:

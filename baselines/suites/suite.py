@@ -21,7 +21,7 @@ from entropy_explore_env.settings.scenario import Scenario
 STARTS, QUICK_STARTS = 30, 2
 """Missions of a task; quick suites take two processors less than ten minutes each."""
 REFERENCE, BASELINE = "nearest-frontier", "random"
-"""The strategy to which ratios of suites are relative; without it, as in scenarios of one's own, the walk."""
+"""The strategy to which most ratios are relative; without it, as in scenarios of one's own, the walk."""
 
 
 class Measure(NamedTuple):
@@ -131,11 +131,12 @@ class Suite:
     """Tasks and the strategies that run them.
 
     Attributes:
-        name: `plans`, `volumes`, `teams`, `others`, `c2`, `faults`, or `own` for scenarios of one's own.
+        name: One of SUITES, or `own` for scenarios of one's own.
         title: Heading of its part of a page.
         tasks: What each strategy runs.
         strategies: Names.
         measures: Two measures, the more important one first.
+        reference: The strategy to which ratios are relative; where it does not run, it is the random walk.
         later: Makes tasks that depend on the records of those before: (suite, cell → records) → tasks.
     """
 
@@ -145,6 +146,7 @@ class Suite:
     strategies: tuple[str, ...]
     measures: tuple[Measure, ...] = (TIME, TIME_90)
     later: Later | None = None
+    reference: str = REFERENCE
 
     def cell_id(self, task: Task, place: Place, strategy: str) -> str:
         """Return the name of a cell of missions."""

@@ -7,7 +7,7 @@ every stop. What a robot is, and what its mission asks for, decides how it explo
 
 - Flying robots, and all in 3-D worlds: bits per time, with the recipe of narrow or of wide views.
 - Ground robots with a scanner that sees all around, in a plan, until the map has a given entropy: bits per
-  time.
+  time, of scans imagined in a predicted map where much is predicted solid (`planner.foresight`).
 - The same robots where everything is to be seen: frontier cells on short tours, see `planner.tour`.
   Bits per time would leave what is small until the end, and drive back for it.
 - The same robots where a part may stay unseen: bits per time, of unknown voxels alone.
@@ -19,11 +19,14 @@ that are left, and then home.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from entropy_explore_env.belief.paths.search import Search
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_candidates import ViewProposer
+from entropy_explore_env.planner.foresight import Foresight, LearnedForesight, foresees
 from entropy_explore_env.planner.tour import SharedTour
 from entropy_explore_env.planner.weights import PlannerWeights
 from entropy_explore_env.settings.changes import with_settings
@@ -54,9 +57,17 @@ def _wants_everything(scenario: Scenario, kind: RobotKind) -> bool:
 class PlannedRate:
     """Chooses among candidates nearby and far away by bits / s^c; in some plans among frontier cells."""
 
-    def __init__(self, weights: PlannerWeights | None = None) -> None:
-        """Take the weights of features by which candidates are chosen; None = by bits / s^c alone."""
-        self.weights = weights
+    def __init__(
+        self,
+        weights: PlannerWeights | None = None,
+        foresight: Callable[[], Foresight] | None = LearnedForesight,
+    ) -> None:
+        """Take the weights of features by which candidates are chosen; None = by bits / s^c alone.
+
+        Without weights, `foresight` makes what predicts unknown voxels in a mission that it suits
+        (`planner.foresight`); None = nothing is predicted.
+        """
+        self.weights, self._foresight = weights, None if weights else foresight
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
@@ -71,7 +82,8 @@ class PlannedRate:
             self._tours.reset(scenario, rng)
             self._parts.append(self._tours)
         if not all(self._by_frontiers):
-            self._proposer = ViewProposer(self._proposing(scenario), rng)
+            foresight = self._foresight() if self._foresight and foresees(scenario) else None
+            self._proposer = ViewProposer(self._proposing(scenario), rng, foresight=foresight)
             self._parts.append(self._proposer)
 
     def _proposing(self, scenario: Scenario) -> Scenario:

@@ -9,7 +9,8 @@ from entropy_explore_env.missions.proposals import Known, locate, propose_to
 from entropy_explore_env.missions.rules import Rules, rules_of
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
-from entropy_explore_env.planner.model import new_proposers
+from entropy_explore_env.planner.foresight import Foresight
+from entropy_explore_env.planner.model import Proposer, new_proposers
 from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE, Kind
 from entropy_explore_env.planner.thresholds import NO_GAIN_BITS
 from entropy_explore_env.settings.scenario import Scenario
@@ -24,17 +25,25 @@ class ViewProposer:
     whose actions are candidates, but for the random numbers.
     """
 
-    def __init__(self, scenario: Scenario, rng: np.random.Generator, overlaps: bool = False) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        rng: np.random.Generator,
+        overlaps: bool = False,
+        foresight: Foresight | None = None,
+    ) -> None:
         """Begin a mission.
 
         Args:
             scenario: With candidates as actions; views may be of a scenario with others.
             rng: The random streams of the robots are drawn from it.
             overlaps: Whether overlaps are wanted.
+            foresight: What is predicted of voxels that a robot never measured; None = nothing.
         """
+        self._foresight = foresight
         team, most = scenario.robots, scenario.action.candidates
         self._rules: Rules = rules_of(scenario)
-        self._proposers = new_proposers(scenario)
+        self._proposers = self._new_proposers(scenario)
         self._candidates = np.zeros((team, most), CANDIDATE)
         self._experience = np.zeros(team, EXPERIENCE)
         self._experience["candidates_rng"][:, 0] = rng.integers(0, 2**64, team, np.uint64)
@@ -45,9 +54,12 @@ class ViewProposer:
         self._proposed: list[tuple[float, float] | None] = [None] * team
         """Time and entropy of the map of the view by which each robot's candidates were proposed."""
 
+    def _new_proposers(self, scenario: Scenario) -> list[Proposer]:
+        return new_proposers(scenario, predicted=self._foresight is not None)
+
     def grow(self, scenario: Scenario, shift: np.ndarray) -> None:
         """Go on in a larger grid, in which voxel (0, 0, 0) of the one before has the indices `shift`."""
-        self._rules, self._proposers = rules_of(scenario), new_proposers(scenario)
+        self._rules, self._proposers = rules_of(scenario), self._new_proposers(scenario)
         for name in ("goal", "far_at", "stood_at", "edge_at", "failed"):
             self._experience[name][..., :3] += shift
 
@@ -74,6 +86,8 @@ class ViewProposer:
     def _propose(self, view: RobotView) -> None:
         robot, no_fly, params = view.robot, view.no_fly_mask(), self._rules.params
         proposer = self._proposers[int(params[robot]["kind"])]
+        if self._foresight is not None:
+            proposer.scratch.scan.solid[:] = self._foresight(view)
         known = proposer.scratch.knowledge[0]
         variances = float(np.trace(view.covariance[:3, :3])), float(view.covariance[3, 3])
         pose, target = view.pose.copy(), view.target.copy()

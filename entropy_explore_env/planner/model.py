@@ -144,17 +144,20 @@ def _block_edge(scenario: Scenario, recipe: Recipe) -> int:
     return max(1, round(recipe.block_m / scenario.grid.voxel_size_m))
 
 
-def new_proposers(scenario: Scenario, recipe: Recipe | None = None) -> list[Proposer]:
+def new_proposers(
+    scenario: Scenario, recipe: Recipe | None = None, predicted: bool = False
+) -> list[Proposer]:
     """Return a proposer for each kind of robot of a team; they share memory, for one thread.
 
     Args:
         scenario: With candidates as actions.
         recipe: Of all kinds; None = that of each.
+        predicted: Whether `ScanScratch.solid` says what is predicted of unknown voxels.
     """
     recipes, voxels = [recipe or recipe_for(kind) for kind in scenario.kinds], scenario.grid.voxels
     rows = max(kind.sensor.rows for kind in scenario.kinds)
     scratch = ProposalScratch(
-        scan=new_scan_scratch(voxels, _longest_ray(scenario), rows),
+        scan=new_scan_scratch(voxels, _longest_ray(scenario), rows, predicted),
         search=new_search(voxels),
         **{name: np.zeros(shape, kind) for name, (shape, kind) in _arrays(scenario, recipes).items()},
     )

@@ -19,6 +19,13 @@ REFINED_SHIFT = 0.2
 PATHS_WITHIN = 1.6
 """Longest path to a place within reach, in reaches: around a corner or two (tuned)."""
 
+# What is predicted where nothing was measured
+SOLID_SHARE = 0.25
+"""Mean predicted probability to be solid, of what was not measured, from which on imagined rays stop as
+predicted (tuned: it lies between offices, whose walls are thin, and all other plans)."""
+RENEWED_M, RENEWED_DECISIONS = 1.0, 8
+"""Metres that a robot moves, and decisions that it makes, until its prediction is renewed (tuned)."""
+
 # Far places
 FIRST_RADIUS = 3.0
 """Length of the paths that are searched first, in reaches; then twice that, and so on (tuned, for time)."""

@@ -4,7 +4,8 @@ Rays go through the belief as those of a scan do, up to the first voxel that is 
 is too near for the sensor, they bring nothing. A ray goes on from a voxel with a probability:
 
 - from an unknown one with 1 - `stop_probability`, or 1 - `gap_probability` where a voxel beside it is
-  believed covered: rays that lie apart leave gaps in what they see of a wall;
+  believed covered: rays that lie apart leave gaps in what they see of a wall; where something is predicted
+  of it, with the probability that it is not solid;
 - from a known one of expected coverage μ ≤ ½, where a wall was hit at a flat angle, with 1 - 2 μ; from the
   voxel in which it starts, it always does. So none gets beyond what is believed covered, whatever
   `voxels_behind` says.
@@ -30,6 +31,8 @@ from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, 
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
+UNPREDICTED = -1.0
+"""In place of a probability: nothing is predicted of a voxel."""
 _LEAST_SHARE = 1e-3
 """Rays that get on with less probability are not followed."""
 _LEAST_GAIN = 1e-45
@@ -82,10 +85,16 @@ class ScanScratch(NamedTuple):
     """(L,) int64."""
     rows: np.ndarray
     """(R, 2) float64, cosine and sine of each row's pitch."""
+    solid: np.ndarray
+    """(V,) float32, predicted probability of each unknown voxel to stop a ray, or UNPREDICTED; (0,) = nothing
+    is ever predicted."""
 
 
-def new_scan_scratch(voxels: int, longest_ray: int, rows: int) -> ScanScratch:
-    """Return memory for a grid, the most of its voxels that a ray crosses, and the most rows of rays."""
+def new_scan_scratch(voxels: int, longest_ray: int, rows: int, predicted: bool = False) -> ScanScratch:
+    """Return memory for a grid, the most of its voxels that a ray crosses, and the most rows of rays.
+
+    `predicted` says whether unknown voxels are ever predicted.
+    """
     return ScanScratch(
         np.zeros(voxels, np.float32),
         np.zeros(voxels + 1, np.int32),
@@ -93,6 +102,7 @@ def new_scan_scratch(voxels: int, longest_ray: int, rows: int) -> ScanScratch:
         np.zeros(longest_ray, np.int32),
         np.zeros(longest_ray, np.int64),
         np.zeros((rows, 2)),
+        np.full(voxels if predicted else 0, UNPREDICTED, np.float32),
     )
 
 
@@ -126,6 +136,15 @@ def _is_beside_covered(belief, voxel):
         or (z > 0 and mean[voxel - 1] > STOP_AT_COVERED)
         or (z < size[2] - 1 and mean[voxel + 1] > STOP_AT_COVERED)
     )
+
+
+@inlined_kernel
+def _stop_probability(belief, scan, scratch, voxel):
+    """Return the probability that an unknown voxel stops a ray."""
+    if len(scratch.solid) > 0 and scratch.solid[voxel] >= 0.0:
+        return np.float64(scratch.solid[voxel])
+    gap = scan.gap_probability != scan.stop_probability and _is_beside_covered(belief, voxel)
+    return scan.gap_probability if gap else scan.stop_probability
 
 
 @inlined_kernel
@@ -165,8 +184,7 @@ def _imagine_ray(belief, scan, start, direction, count, scratch):
         if belief.precision[voxel] < scan.wanted_precision:
             count = _touch(scratch, voxel, gain * share, count)
         if belief.precision[voxel] < scan.known_precision:
-            gap = scan.gap_probability != scan.stop_probability and _is_beside_covered(belief, voxel)
-            share *= 1.0 - (scan.gap_probability if gap else scan.stop_probability)
+            share *= 1.0 - _stop_probability(belief, scan, scratch, voxel)
         elif i > 0:
             share *= 1.0 - min(2.0 * belief.mean[voxel], 1.0)
         if share < _LEAST_SHARE:

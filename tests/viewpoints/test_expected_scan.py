@@ -19,6 +19,7 @@ from entropy_explore_env.settings.scenarios import BOX
 from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.viewpoints.evaluation import new_scratch, robot_model
 from entropy_explore_env.viewpoints.expected_scan import (
+    UNPREDICTED,
     ScanModel,
     expected_bits,
     new_scan_scratch,
@@ -55,10 +56,11 @@ def model(stop_probability=0.0, known_precision=0.0, rays=1.0, sensor=SENSOR, po
     )
 
 
-def expected(mean, precision, viewpoint, scan, cones=NO_CONES):
-    scratch = new_scan_scratch(
-        mean.size, longest_crossing(*SIZE, math.inf, scan.voxels_behind), len(scan.pitches)
-    )
+def expected(mean, precision, viewpoint, scan, cones=NO_CONES, solid=None):
+    longest = longest_crossing(*SIZE, math.inf, scan.voxels_behind)
+    scratch = new_scan_scratch(mean.size, longest, len(scan.pitches), solid is not None)
+    if solid is not None:
+        scratch.solid[:] = solid.ravel()
     belief = Belief(mean.ravel(), precision.ravel(), SIZE)
     mark_cones(cones, SIZE, scratch.left)
     bits = expected_bits(belief, scan, np.array(viewpoint, float), scratch)
@@ -112,6 +114,26 @@ def test_one_ray_by_hand():
     near = 1.0 / (0.1 + 0.05 * 1.25) ** 2
     stopped = expected(mean, precision, viewpoint, model(sensor=one))
     assert stopped == pytest.approx(4 * 0.5 * math.log2(1 + near / 4.0), rel=1e-5)
+
+
+def test_a_ray_stops_as_predicted_where_nothing_is_known():
+    """Voxels 1 … 6 along x, of which 3 is known: a prediction of it does not count."""
+    one = RangeSensor((0.0, 0.0), 0.1, sigma_min=0.1, sigma_slope_per_m=0.05)
+    mean, precision = np.zeros(SIZE, np.float32), np.full(SIZE, 4.0, np.float32)
+    precision[3, 5, 2] = 20.0
+    scan, viewpoint = model(0.5, known_precision=5.0, sensor=one), (1.5, 5.5, 2.5, 0.0, 0.0)
+    solid = np.full(SIZE, UNPREDICTED, np.float32)
+    solid[2:5, 5, 2] = 0.25, 1.0, 0.75
+    gain, shares = 1.0 / 0.2375**2, (1.0, 0.5, 0.5 * 0.75, 0.5 * 0.75, 0.5 * 0.75 * 0.25)
+    bits = [gain * share / (20.0 if n == 2 else 4.0) for n, share in enumerate((*shares, shares[-1] * 0.5))]
+    found = expected(mean, precision, viewpoint, scan, solid=solid)
+    assert found == pytest.approx(sum(0.5 * math.log2(1 + each) for each in bits), rel=1e-5)
+    unpredicted = np.full(SIZE, UNPREDICTED, np.float32)
+    as_before = expected(mean, precision, viewpoint, scan)
+    assert expected(mean, precision, viewpoint, scan, solid=unpredicted) == as_before
+    solid[2, 5, 2] = 1.0  # nothing beyond it
+    seen = expected(mean, precision, viewpoint, scan, solid=solid)
+    assert seen == pytest.approx(0.5 * math.log2(1 + gain / 4.0) + 0.5 * math.log2(1 + gain * 0.5 / 4.0))
 
 
 @pytest.mark.parametrize(("stop_probability", "sigma_min"), [(1.0, 0.1), (0.0, 1e25)])

@@ -1,0 +1,98 @@
+"""What a planner expects of voxels that a robot never measured: a prediction in place of one probability.
+
+Imagined rays pass an unknown voxel with the same probability everywhere (`recipe`), so a robot expects to see
+into rock. Where most of what is unknown is predicted to be solid, they stop as predicted. Behind thin walls,
+as in offices, that brings nothing, even with the true map in place of the prediction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from entropy_explore_env.planner.thresholds import RENEWED_DECISIONS, RENEWED_M, SOLID_SHARE
+from entropy_explore_env.prediction.crop import ROUNDING
+from entropy_explore_env.prediction.predictor import Prediction
+from entropy_explore_env.robots.knowledge import RobotKnowledge
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.viewpoints.evaluation import sees_all_around
+from entropy_explore_env.viewpoints.expected_scan import UNPREDICTED
+
+Foresight = Callable[[RobotKnowledge], np.ndarray]
+"""What one robot knows → (V,) float32, of each voxel that it never measured the probability to stop a ray, or
+UNPREDICTED; what it says of other voxels does not count."""
+
+
+def foresees(scenario: Scenario) -> bool:
+    """Return whether predictions pay: for ground robots with scanners that see all around, in plans.
+
+    Where the mission is over when enough is seen, they were no better, even with the true map.
+    """
+    planar = scenario.grid.flat and all(kind.robot.motion == "planar" for kind in scenario.kinds)
+    return (
+        planar
+        and not scenario.ending.by_seen
+        and all(sees_all_around(kind.sensor) for kind in scenario.kinds)
+    )
+
+
+class LearnedForesight:
+    """What the shipped predictor says of unknown voxels in a plan, in one mission; a Foresight.
+
+    A robot's prediction is renewed as it moves on, and after some decisions on one spot; at every decision it
+    took twice the time, and brought nothing.
+    """
+
+    def __init__(self) -> None:
+        """Begin a mission."""
+        self._latest: dict[int, _Predicted] = {}
+
+    def __call__(self, view: RobotKnowledge) -> np.ndarray:
+        """Return what was predicted last, or anew; a grid may grow from one decision to the next."""
+        latest = self._latest.get(view.robot)
+        if latest is None or len(latest.solid) != view.precision.size or latest.is_old(view.pose):
+            latest = self._latest[view.robot] = _Predicted(view.pose[:2].copy(), _predicted_solid(view))
+        latest.decisions += 1
+        return latest.solid
+
+
+@dataclass
+class _Predicted:
+    """What was predicted for a robot."""
+
+    place_m: np.ndarray
+    """(2,) x, y of where it was."""
+    solid: np.ndarray
+    """(V,) of a Foresight."""
+    decisions: int = 0
+    """Number of decisions that were made by it."""
+
+    def is_old(self, pose: np.ndarray) -> bool:
+        """Return whether the robot, which is at a pose now, needs another one."""
+        moved_m = np.linalg.norm(pose[:2] - self.place_m)
+        return bool(moved_m >= RENEWED_M or self.decisions >= RENEWED_DECISIONS)
+
+
+def _predicted_solid(view: RobotKnowledge) -> np.ndarray:
+    prediction, grid = view.prediction, view.scenario.grid
+    solid = np.full(grid.shape, UNPREDICTED, np.float32)
+    (columns, across), (rows, along) = (_cells(prediction, grid, axis) for axis in (0, 1))
+    guess = prediction.solid[np.ix_(across, along)]
+    unknown = view.precision[columns, rows, 0] <= view.scenario.sigma_prior**-2 * (1.0 + ROUNDING)
+    if unknown.any() and guess[unknown].mean() >= SOLID_SHARE:
+        # a ray across a cell of several voxels stops in one of them
+        voxels = min(grid.voxel_size_m / prediction.cell_m, 1.0)
+        solid[columns, rows, 0] = 1.0 - (1.0 - guess) ** voxels
+    return solid.reshape(-1)
+
+
+def _cells(prediction: Prediction, grid: Grid, axis: int) -> tuple[slice, np.ndarray]:
+    """Return the voxels along an axis whose centres a prediction holds, and the cells in which these lie."""
+    centres_m = grid.origin_m[axis] + (np.arange(grid.shape[axis]) + 0.5) * grid.voxel_size_m
+    cells = np.floor((centres_m - prediction.origin_m[axis]) / prediction.cell_m + ROUNDING).astype(np.int64)
+    held = np.flatnonzero((cells >= 0) & (cells < prediction.solid.shape[axis]))
+    first = int(held[0]) if len(held) else 0
+    return slice(first, first + len(held)), cells[held]

@@ -1,0 +1,125 @@
+"""Foresight: predictions of unknown voxels, where they count, when they are renewed, and what follows."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from baselines.experiments.mission import run_mission, scripted_env
+from entropy_explore_env.explorer.planned_rate import PlannedRate
+from entropy_explore_env.planner import foresight
+from entropy_explore_env.planner.foresight import LearnedForesight, foresees
+from entropy_explore_env.planner.thresholds import RENEWED_DECISIONS, RENEWED_M, SOLID_SHARE
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import SCENARIOS
+from entropy_explore_env.viewpoints.expected_scan import UNPREDICTED
+
+SHAPE, PRIOR = (7, 11, 1), 0.25
+
+
+def view_of(solid, voxel_size_m=0.2, shape=SHAPE, origin_m=(0.0, 0.0), precision=None, cell_m=0.2):
+    """Return what foresight reads of a robot at (0.5, 0.5) m, with a prediction from (0, 0) m on."""
+    known = np.full(shape, PRIOR, np.float32) if precision is None else precision
+    prediction = SimpleNamespace(solid=solid, origin_m=np.zeros(2), cell_m=cell_m)
+    grid = Grid(shape, voxel_size_m, (*origin_m, 0.0))
+    scenario = SimpleNamespace(grid=grid, sigma_prior=PRIOR**-0.5)
+    pose = np.array([0.5, 0.5, 0.1, 0.0, 0.0])
+    return SimpleNamespace(robot=0, pose=pose, precision=known, prediction=prediction, scenario=scenario)
+
+
+def drawn_cells(shape, seed=1):
+    return np.random.default_rng(seed).uniform(0.4, 1.0, shape).astype(np.float32)
+
+
+@pytest.mark.parametrize("voxel_size_m", [0.1, 0.2, 0.25, 0.4])
+def test_voxels_are_predicted_by_the_cell_of_their_centre(voxel_size_m):
+    """Those whose centre no cell holds are not; of n voxels across a cell one stops as often as the cell."""
+    cells = drawn_cells((5, 6))
+    found = LearnedForesight()(view_of(cells, voxel_size_m, origin_m=(-0.3, -0.2))).reshape(SHAPE)
+    for x, y, _ in np.ndindex(*SHAPE):
+        at = [((n + 0.5) * voxel_size_m - off) / 0.2 for n, off in ((x, 0.3), (y, 0.2))]
+        expected = UNPREDICTED
+        if 0.0 <= at[0] < 5.0 and 0.0 <= at[1] < 6.0:
+            across = max(0.2 / voxel_size_m, 1.0)
+            expected = 1.0 - (1.0 - cells[int(at[0]), int(at[1])]) ** (1.0 / across)
+        assert found[x, y, 0] == pytest.approx(expected, abs=1e-6), (x, y)
+
+
+def test_nothing_is_predicted_where_little_of_what_is_unknown_is_solid():
+    """What was measured does not count, whatever it is."""
+    cells, precision = np.full(SHAPE[:2], 0.99, np.float32), np.full(SHAPE, PRIOR, np.float32)
+    cells[:3], precision[3:] = SOLID_SHARE - 0.01, 10.0
+    assert (LearnedForesight()(view_of(cells, precision=precision)) == UNPREDICTED).all()
+    cells[:3] = SOLID_SHARE + 0.01
+    assert (LearnedForesight()(view_of(cells, precision=precision)) > 0.0).all()
+    assert (LearnedForesight()(view_of(cells, precision=np.full(SHAPE, 9.0))) == UNPREDICTED).all()
+
+
+def test_a_prediction_is_renewed_as_its_robot_moves_on_or_the_grid_grows():
+    foreseen, first, second = LearnedForesight(), drawn_cells(SHAPE[:2], 1), drawn_cells(SHAPE[:2], 2)
+    before = foreseen(view_of(first))
+    view = view_of(second)
+    view.pose[0] += 0.99 * RENEWED_M
+    assert foreseen(view) is before
+    view.robot = 1
+    assert not np.array_equal(foreseen(view), before)
+    view.robot = 0
+    for _ in range(RENEWED_DECISIONS - 2):
+        assert foreseen(view) is before
+    again = foreseen(view)
+    assert not np.array_equal(again, before)
+    view = view_of(first)
+    view.pose[0] += 1.98 * RENEWED_M
+    assert foreseen(view) is again
+    view.pose[0] += 0.02 * RENEWED_M
+    assert np.array_equal(foreseen(view), before)
+    assert len(foreseen(view_of(drawn_cells((8, 11)), shape=(8, 11, 1)))) == 88
+
+
+def test_a_prediction_that_holds_no_centre_says_nothing():
+    found = LearnedForesight()(view_of(drawn_cells((5, 6)), voxel_size_m=4.0))
+    assert (found == UNPREDICTED).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "pays"),
+    [
+        ("corridor", {}, True),
+        ("office", {"robots": 3}, True),
+        ("office", {"ending": {"seen_share": 1.0}}, False),
+        ("room", {}, False),
+        ("cave", {}, False),
+        ("office-3d", {}, False),
+        ("office-mixed", {}, False),
+        ("corridor", {"sensor": {"field_of_view_rad": (1.0, 0.1)}}, False),
+    ],
+)
+def test_missions_in_which_predictions_pay(name, changes, pays):
+    assert foresees(with_settings(SCENARIOS[name], changes)) == pays
+
+
+def goals_of(strategy, scenario):
+    """Return the viewpoints of the first decisions of a mission."""
+    env, goals = scripted_env(scenario), []
+
+    def note(actions):
+        goals.append(np.concatenate(list(actions.values())))
+        return len(goals) == 40
+
+    run_mission(env, strategy, 3, before_step=note)
+    return np.array(goals)
+
+
+def test_the_planner_heeds_predictions_in_corridors_alone(monkeypatch):
+    """In offices, and where nothing is predicted, its goals are those of the planner without predictions."""
+    corridor = with_settings(SCENARIOS["corridor"], {"split": "validation"})
+    office = with_settings(SCENARIOS["office"], {"split": "validation", "robots": 1})
+    assert not np.array_equal(
+        goals_of(PlannedRate(), corridor), goals_of(PlannedRate(foresight=None), corridor)
+    )
+    assert np.array_equal(goals_of(PlannedRate(), office), goals_of(PlannedRate(foresight=None), office))
+    monkeypatch.setattr(foresight, "SOLID_SHARE", 1.1)
+    assert np.array_equal(goals_of(PlannedRate(), corridor), goals_of(PlannedRate(foresight=None), corridor))
