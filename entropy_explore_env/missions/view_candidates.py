@@ -14,6 +14,7 @@ from entropy_explore_env.planner.model import Proposer, new_proposers
 from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE, Kind
 from entropy_explore_env.planner.thresholds import NO_GAIN_BITS
 from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.viewpoints.expected_scan import MOST_SCANS, UNPREDICTED, ScanScratch
 
 _NO_CEILING = np.zeros(0, np.bool_)
 
@@ -87,7 +88,7 @@ class ViewProposer:
         robot, no_fly, params = view.robot, view.no_fly_mask(), self._rules.params
         proposer = self._proposers[int(params[robot]["kind"])]
         if self._foresight is not None:
-            proposer.scratch.scan.solid[:] = self._foresight(view)
+            _foresee(self._foresight(view), proposer.scratch.scan)
         known = proposer.scratch.knowledge[0]
         variances = float(np.trace(view.covariance[:3, :3])), float(view.covariance[3, 3])
         pose, target = view.pose.copy(), view.target.copy()
@@ -128,6 +129,12 @@ class ViewProposer:
     def viewpoint(self, robot: int, number: int) -> np.ndarray:
         """Return (5,) the viewpoint of a candidate proposed last, map frame; else the first one."""
         return self._candidates[robot, number]["viewpoint"].copy()
+
+
+def _foresee(solid: np.ndarray, scratch: ScanScratch) -> None:
+    """Have scans imagined in a predicted map, and several of them at one place, if anything is predicted."""
+    scratch.solid[:] = solid
+    scratch.scans[0] = MOST_SCANS if (solid != UNPREDICTED).any() else 1
 
 
 def writable(array: np.ndarray) -> np.ndarray:

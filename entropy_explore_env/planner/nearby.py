@@ -20,7 +20,7 @@ from entropy_explore_env.planner.thresholds import (
 )
 from entropy_explore_env.randomness import draw_gaussian, draw_uniform
 from entropy_explore_env.viewpoints.evaluation import indices_at, straight_seconds, travel_seconds
-from entropy_explore_env.viewpoints.expected_scan import expected_bits
+from entropy_explore_env.viewpoints.expected_scan import fill_bits
 
 _SPOT, _NEAR = int(Kind.SPOT), int(Kind.NEAR)
 
@@ -130,6 +130,25 @@ def _vary(proposer, situation, spread, at):
 
 
 @lean_kernel
+def _weigh(proposer, situation, filled, option):
+    """Fill in the bits of a scan at an OPTION, and what it is worth with the number of scans that pays most.
+
+    Args:
+        proposer: See `model`; the bits of scans there are in its scratch.
+        situation: See `model`.
+        filled: See `fill_bits`.
+        option: OPTION, whose seconds are finite.
+    """
+    bits, scan_s = proposer.scratch.scan.bits, proposer.drive.scan_time_s
+    option.bits = option.stop_bits = worth_bits(proposer, situation, option.viewpoint, bits[0])
+    option.value = value_of(proposer, situation, option.bits, option.seconds)
+    for n in range(1, filled):
+        seconds = option.seconds + (2**n - 1) * scan_s
+        worth = option.bits * bits[n] / max(bits[0], 1e-300)
+        option.value = max(option.value, value_of(proposer, situation, worth, seconds))
+
+
+@lean_kernel
 def evaluate(proposer, situation, scan, options, far):
     """Fill in what viewpoints (N,) OPTION are worth, with scans imagined by a ScanModel.
 
@@ -146,11 +165,9 @@ def evaluate(proposer, situation, scan, options, far):
             option.seconds = travel_seconds(drive, edge_m, here, at, cost, reach)
         else:
             option.seconds = straight_seconds(belief, edge_m, drive, here, at, scratch.scan)
-        bits = 0.0
+        option.bits, option.stop_bits, option.value = 0.0, 0.0, 0.0
         if option.seconds < math.inf:
-            bits = expected_bits(belief, scan, at, scratch.scan)
-        option.bits = option.stop_bits = worth_bits(proposer, situation, at, bits)
-        option.value = value_of(proposer, situation, option.bits, option.seconds)
+            _weigh(proposer, situation, fill_bits(belief, scan, at, scratch.scan), option)
         moved = at[0] != here[0] or at[1] != here[1] or at[2] != here[2]
         option.kind = _NEAR if moved else _SPOT
         copy_numbers(at, option.goal)

@@ -15,8 +15,9 @@ What all rays add to a voxel counts once,
     I = Σ ½ log2(1 + Σ_rays w/σ(d)² / p),
 
 with p the voxel's precision, d the ray's length and w the probability that it gets there (Rocha04, eqs. 5, 17
-and 27). Voxels that are left to teammates count nothing. All places are in grid units; viewpoints are x, y,
-z, yaw, pitch. In all functions `belief` is a Belief, `scan` a ScanModel and `scratch` a ScanScratch.
+and 27). Of n scans from one place the sum over rays counts n times. Voxels that are left to teammates count
+nothing. All places are in grid units; viewpoints are x, y, z, yaw, pitch. In all functions `belief` is a
+Belief, `scan` a ScanModel and `scratch` a ScanScratch.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, 
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
+MOST_SCANS, _DOUBLINGS = 8, 3
 UNPREDICTED = -1.0
 """In place of a probability: nothing is predicted of a voxel."""
 _LEAST_SHARE = 1e-3
@@ -88,6 +90,12 @@ class ScanScratch(NamedTuple):
     solid: np.ndarray
     """(V,) float32, predicted probability of each unknown voxel to stop a ray, or UNPREDICTED; (0,) = nothing
     is ever predicted."""
+    scans: np.ndarray
+    """(1,) int64, how many scans from one place are imagined at most: 1, 2, 4 or MOST_SCANS."""
+    bits: np.ndarray
+    """(4,) float64, what 1, 2, 4 and 8 of them should bring."""
+    growth: np.ndarray
+    """(4,) float64."""
 
 
 def new_scan_scratch(voxels: int, longest_ray: int, rows: int, predicted: bool = False) -> ScanScratch:
@@ -103,6 +111,9 @@ def new_scan_scratch(voxels: int, longest_ray: int, rows: int, predicted: bool =
         np.zeros(longest_ray, np.int64),
         np.zeros((rows, 2)),
         np.full(voxels if predicted else 0, UNPREDICTED, np.float32),
+        np.ones(1, np.int64),
+        np.zeros(1 + _DOUBLINGS),
+        np.zeros(1 + _DOUBLINGS),
     )
 
 
@@ -229,3 +240,41 @@ def expected_bits(belief, scan, at, scratch):
             bits += math.log2(growth)
             growth = 1.0
     return 0.5 * (bits + math.log2(growth))
+
+
+@lean_kernel
+def fill_bits(belief, scan, at, scratch):
+    """Fill in `scratch.bits`: what one scan from a viewpoint (5,) should bring, then what 2, 4, … should.
+
+    Returns:
+        How many of these are filled in, by `scratch.scans`.
+    """
+    bits, growth, filled = scratch.bits, scratch.growth, 1
+    while 2**filled <= scratch.scans[0]:
+        filled += 1
+    if filled == 1:
+        bits[0] = expected_bits(belief, scan, at, scratch)
+        return filled
+    count = imagine_scan(belief, scan, at, scratch)
+    bits[:], growth[:] = 0.0, 1.0
+    for i in range(count):
+        voxel = np.uint32(scratch.touched[np.uint32(i)])
+        share = np.float64(scratch.added[voxel]) / np.float64(belief.precision[voxel])
+        scratch.added[voxel] = 0.0
+        if scratch.left[voxel]:
+            continue
+        for n in range(filled):
+            growth[n] *= 1.0 + share
+            share *= 2.0
+        if growth[filled - 1] > _FOLD_ABOVE:
+            _fold(bits, growth)
+    _fold(bits, growth)
+    return filled
+
+
+@inlined_kernel
+def _fold(bits, growth):
+    """Add the logarithms of the products of ratios to the bits, and begin new products."""
+    for n in range(len(bits)):
+        bits[n] += 0.5 * math.log2(growth[n])
+        growth[n] = 1.0

@@ -9,13 +9,14 @@ import pytest
 
 from baselines.experiments.mission import run_mission, scripted_env
 from entropy_explore_env.explorer.planned_rate import PlannedRate
+from entropy_explore_env.missions.view_candidates import _foresee
 from entropy_explore_env.planner import foresight
 from entropy_explore_env.planner.foresight import LearnedForesight, foresees
 from entropy_explore_env.planner.thresholds import RENEWED_DECISIONS, RENEWED_M, SOLID_SHARE
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import SCENARIOS
-from entropy_explore_env.viewpoints.expected_scan import UNPREDICTED
+from entropy_explore_env.viewpoints.expected_scan import MOST_SCANS, UNPREDICTED, new_scan_scratch
 
 SHAPE, PRIOR = (7, 11, 1), 0.25
 
@@ -99,6 +100,13 @@ def test_a_prediction_that_holds_no_centre_says_nothing():
 )
 def test_missions_in_which_predictions_pay(name, changes, pays):
     assert foresees(with_settings(SCENARIOS[name], changes)) == pays
+
+
+def test_several_scans_count_where_something_is_predicted():
+    scratch = new_scan_scratch(6, 10, 1, predicted=True)
+    for solid, most in ((np.full(6, UNPREDICTED), 1), (np.array([UNPREDICTED, 0.0] * 3), MOST_SCANS)):
+        _foresee(solid, scratch)
+        assert scratch.scans[0] == most and np.array_equal(scratch.solid, solid.astype(np.float32))
 
 
 def goals_of(strategy, scenario):

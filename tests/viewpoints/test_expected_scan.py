@@ -22,6 +22,7 @@ from entropy_explore_env.viewpoints.expected_scan import (
     UNPREDICTED,
     ScanModel,
     expected_bits,
+    fill_bits,
     new_scan_scratch,
 )
 from tests.reference.scenes import (
@@ -134,6 +135,25 @@ def test_a_ray_stops_as_predicted_where_nothing_is_known():
     solid[2, 5, 2] = 1.0  # nothing beyond it
     seen = expected(mean, precision, viewpoint, scan, solid=solid)
     assert seen == pytest.approx(0.5 * math.log2(1 + gain / 4.0) + 0.5 * math.log2(1 + gain * 0.5 / 4.0))
+
+
+@drawn(30)
+@given(seeds, st.sampled_from([1, 2, 4, 8]), st.floats(1e-6, 1e6))
+def test_several_scans_bring_what_one_with_as_many_rays_brings(seed, most, precise):
+    """Also where products of ratios leave a float64, and where a part is left to teammates."""
+    rng = np.random.default_rng(seed)
+    mean, precision = random_cover(SIZE, 0.1, seed), rng.uniform(0.01, 5.0, SIZE).astype(np.float32) / precise
+    viewpoint = (*rng.uniform(0.5, np.array(SIZE) - 0.5), rng.uniform(-3.0, 3.0), rng.uniform(-1.0, 1.0))
+    cones = np.array([cone_of(np.array(viewpoint), 4.0, 0.3)])
+    longest = longest_crossing(*SIZE, math.inf, 0)
+    scratch = new_scan_scratch(mean.size, longest, len(model().pitches))
+    scratch.scans[0] = most
+    mark_cones(cones, SIZE, scratch.left)
+    belief = Belief(mean.ravel(), precision.ravel(), SIZE)
+    filled = fill_bits(belief, model(), np.array(viewpoint, float), scratch)
+    assert filled == 1 + math.log2(most) and not scratch.added.any()
+    single = [expected(mean, precision, viewpoint, model(rays=2.0**n), cones) for n in range(filled)]
+    assert scratch.bits[:filled] == pytest.approx(single, rel=1e-5)
 
 
 @pytest.mark.parametrize(("stop_probability", "sigma_min"), [(1.0, 0.1), (0.0, 1e25)])
