@@ -54,8 +54,6 @@ class Scan(NamedTuple):
     """(R, L) int32 voxels on each ray."""
     entered: np.ndarray
     """(L,) int64 ticks at which the latest ray entered its voxels."""
-    entered_beside: np.ndarray
-    """(L,) int64, the same of a second ray that is traced at the same time."""
     coverage: np.ndarray
     """(R, L) float32 measured coverage, from index `free` on."""
     order: np.ndarray

@@ -30,7 +30,6 @@ from entropy_explore_env.robots.localization import (
 )
 from entropy_explore_env.robots.measured_rays import trace_measurements
 from entropy_explore_env.robots.pose_covariance import within_half_turn
-from entropy_explore_env.robots.range_sensor import measure_ranges, take_scan
 
 _INSIDE = 1e-6
 """How far within the workspace's upper faces an estimate is taken, in edges: these belong to no voxel."""
@@ -207,15 +206,6 @@ def choice_into_world(estimate, params, robot, choice, time_s):
 
 
 @lean_kernel
-def measure(localization, scan, sensor, scene, pose, rng):
-    """Measure from where a robot truly is: a whole scan, or where robots drift its ranges alone."""
-    if localization is None:  # known while compiling: nothing of the rest is compiled
-        take_scan(scan, sensor, scene, pose, rng)
-        return
-    measure_ranges(scan, sensor, scene, pose, rng)
-
-
-@lean_kernel
 def believe_scan(localization, index, scan, sensor, scene, pose):
     """Let a scan be what its robot takes it for: measured from where it believes to be, and less precise.
 
@@ -233,7 +223,7 @@ def believe_scan(localization, index, scan, sensor, scene, pose):
         x, y = ray.direction[0], ray.direction[1]
         ray.direction[0] += along * x - across * y
         ray.direction[1] += across * x + along * y
-    trace_measurements(scan, sensor, scene.size, scene.voxel_size_m, pose)
+    trace_measurements(scan, sensor, scene.size, scene.voxel_size_m, pose, scene.occupied)
     pack_covariance(estimate.covariance, estimate.packed)
     weigh_by_covariance(scan.rays, len(scan.rays), estimate.packed, scene.voxel_size_m)
 

@@ -10,7 +10,6 @@ from entropy_explore_env.missions.localization import (
     believe_scan,
     believed_pose,
     estimate_of,
-    measure,
     note_scan_pose,
 )
 from entropy_explore_env.missions.messages import fuse_measurements, send_batch
@@ -28,6 +27,7 @@ from entropy_explore_env.robots.range_sensor import (
     SensorPose,
     first_rays,
     in_view,
+    take_scan,
     visibility_parameters,
 )
 
@@ -47,7 +47,7 @@ def scan_and_share(mission, sensor, index, work):
     if not blinded(team.faults, index, clock.time_s):
         sight_fiducials(team.localization, params, index, sensor, scene, pose)
         sight_landmarks(team.localization, params, index, sensor, scene, pose, work.covariances)
-    measure(team.localization, scan, sensor, scene, pose, robot.sensor_rng)
+    take_scan(scan, sensor, scene, pose, robot.sensor_rng)
     spoil(team.faults, index, scan, sensor, scene, pose, clock.time_s)
     here = believed_pose(estimate_of(team.localization, index), params, (x, y, z, yaw, pitch))
     believe_scan(team.localization, index, scan, sensor.params[0], scene, within_grid(params, here))

@@ -63,7 +63,7 @@ def fuse_given(scan, model, frame, pose, ranges_m, by_rays, mean, precision):
             ray.returned, ray.length = _FREE, params.max_range_m / edge_m
         elif range_m >= params.min_range_m:
             ray.returned, ray.length = _HIT, max(range_m / edge_m, NEAREST)
-    trace_measurements(scan, params, size, edge_m, start)
+    trace_measurements(scan, params, size, edge_m, start, mean)
     bits = fuse_scan(scan, len(scan.rays), mean, precision)
     depth_m, half_angle_rad, _ = visibility_parameters(scan.rays, pose[0], pose[1])
     return bits, depth_m, half_angle_rad

@@ -6,7 +6,7 @@ Positions and lengths in grid units, ranges in metres.
 from __future__ import annotations
 
 from entropy_explore_env.belief.measurement_model import Return, measured_coverage, measurement_precision
-from entropy_explore_env.belief.raycast import NEVER_STOP, Crossing, Line, cast_ray, point, trace_two
+from entropy_explore_env.belief.raycast import NEVER_STOP, Crossing, Line, cast_ray, point
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
 _NOTHING, _HIT = int(Return.NOTHING), int(Return.HIT)
@@ -52,36 +52,8 @@ def trace_measurement(scan, index, params, size, voxel_size_m, start, coverage):
 
 
 @lean_kernel
-def trace_measurements(scan, params, size, voxel_size_m, start):
-    """Fill in what `trace_measurement` does for all rays that measured something, two at a time."""
-    rays, waiting = scan.rays, -1
-    for index in range(len(rays)):
-        if rays[index].returned == _NOTHING:
-            continue
-        if waiting < 0:
-            waiting = index
-            continue
-        _trace_pair(scan, waiting, index, params, size, voxel_size_m, start)
-        waiting = -1
-    if waiting >= 0:  # beside itself: its voxels are noted where those of the second are
-        _trace_pair(scan, waiting, waiting, params, size, voxel_size_m, start)
-
-
-@inlined_kernel
-def _trace_pair(scan, index, other_index, params, size, voxel_size_m, start):
-    """Fill in what `trace_measurement` does, for two rays."""
-    ray, other = scan.rays[index], scan.rays[other_index]
-    ray.range_m, other.range_m = ray.length * voxel_size_m, other.length * voxel_size_m
-    ray.voxels, other.voxels = trace_two(
-        size,
-        Line(start, point(ray.direction), ray.length),
-        Line(start, point(other.direction), other.length),
-        (
-            params.voxels_behind if ray.returned == _HIT else 0,
-            params.voxels_behind if other.returned == _HIT else 0,
-        ),
-        Crossing(scan.crossed[index], scan.entered),
-        Crossing(scan.crossed[other_index], scan.entered_beside),
-    )
-    weigh_measurement(scan, index, params, size, start, scan.entered)
-    weigh_measurement(scan, other_index, params, size, start, scan.entered_beside)
+def trace_measurements(scan, params, size, voxel_size_m, start, coverage):
+    """Fill in what `trace_measurement` does for all rays that measured something."""
+    for index in range(len(scan.rays)):
+        if scan.rays[index].returned != _NOTHING:
+            trace_measurement(scan, index, params, size, voxel_size_m, start, coverage)

@@ -23,7 +23,6 @@ from entropy_explore_env.belief.raycast import (
     Line,
     RayEnd,
     cast_ray,
-    cast_two_ranges,
     longest_crossing,
     point,
 )
@@ -148,7 +147,6 @@ def first_rays(scan, count):
         scan.utility[:count],
         scan.crossed,
         scan.entered,
-        scan.entered_beside,
         scan.coverage,
         scan.order[:count],
     )
@@ -165,7 +163,6 @@ def new_scan(grid: Grid, sensors: Sequence[RangeSensor], rays: int) -> Scan:
         utility=np.zeros(rays),
         crossed=np.zeros((rays, longest), np.int32),
         entered=np.zeros(longest, np.int64),
-        entered_beside=np.zeros(longest, np.int64),
         coverage=np.zeros((rays, longest), np.float32),
         order=np.zeros(rays, np.int64),
     )
@@ -177,7 +174,7 @@ def scan_bytes(grid: Grid, sensors: Sequence[RangeSensor], rays: int) -> int:
         longest_crossing(*grid.shape, sensor.max_range_m / grid.voxel_size_m, sensor.voxels_behind)
         for sensor in sensors
     )
-    return rays * (RAY.itemsize + 16 + 8 * longest) + 16 * longest
+    return rays * (RAY.itemsize + 16 + 8 * longest) + 8 * longest
 
 
 @inlined_kernel
@@ -268,32 +265,6 @@ def take_scan(scan, model, scene, pose, rng):
             trace_measurement(scan, index, params, scene.size, scene.voxel_size_m, start, scene.occupied)
         else:
             weigh_measurement(scan, index, params, scene.size, start, scan.entered)
-
-
-@lean_kernel
-def measure_ranges(scan, model, scene, pose, rng):
-    """Measure as `take_scan` does, without the voxels on the rays.
-
-    For a robot that believes to be somewhere else: to it these voxels mean nothing.
-    """
-    params, start = model.params[0], pose.start
-    point_rays(model, pose.yaw, pose.pitch, scan.rays)
-    reach = params.max_range_m / scene.voxel_size_m
-    rays = scan.rays
-    for index in range(0, len(rays), 2):
-        beside = min(index + 1, len(rays) - 1)
-        ray, other = rays[index], rays[beside]
-        (length, covered, end), (other_length, other_covered, other_end) = cast_two_ranges(
-            scene.occupied,
-            scene.size,
-            Line(start, point(ray.direction), reach),
-            Line(start, point(other.direction), reach),
-            STOP_AT_COVERED,
-        )
-        measure_ray(ray, params, scene, start, RayEnd(length, 0, end), covered >= _UNREADABLE, rng)
-        if beside > index:
-            ended = RayEnd(other_length, 0, other_end)
-            measure_ray(other, params, scene, start, ended, other_covered >= _UNREADABLE, rng)
 
 
 @inlined_kernel

@@ -84,7 +84,6 @@ def random_scan(rng, rays):
         utility=np.full(rays, np.nan),
         crossed=np.full((rays, 19), -1, np.int32),
         entered=np.zeros(19, np.int64),
-        entered_beside=np.zeros(19, np.int64),
         coverage=rng.random((rays, 19), np.float32),
         order=rng.permutation(rays),
     )
