@@ -10,17 +10,18 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy import ndimage
 
 from entropy_explore_env.belief.raycast import STOP_AT_COVERED
-from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.validation import is_number
 
-_SWEEPS_AT_ONCE, _ROWS_AT_ONCE = 6, 32
-"""Sweeps that go over the rows together, and rows of each before the next one: what is fastest."""
 _SWEEPS_PER_CELL = 40
 """Relaxation ends after this many sweeps for each cell of the widest gap, whatever is left of its changes."""
+_CROSS = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]])
+"""The four neighbours of a column."""
 
 
 class ElevationMap(NamedTuple):
@@ -140,165 +141,63 @@ def _relaxed(heights: np.ndarray, fixed: np.ndarray, tolerance: float) -> np.nda
     The slowest error over a gap of D columns that ends at the border falls by ρ = (1 + cos(π/(2D + 1)))/2 in
     a sweep of Jacobi's; the best factor for it is ω = 2/(1 + √(1 - ρ²)) (Young 1954).
     """
-    rows, columns = heights.shape
-    board = _new_board(rows, columns)
-    gap = _set_out(board, heights, fixed, np.empty(heights.shape, np.int32))
+    gap = int(np.max(np.asarray(ndimage.distance_transform_cdt(~fixed, "taxicab"))))
     slowest = 0.5 * (1.0 + math.cos(math.pi / (2 * gap + 1)))
     factor = 2.0 / (1.0 + math.sqrt(1.0 - slowest * slowest))
-    _share_out(board, fixed, factor)
-    before = board._replace(white=np.empty_like(board.white), black=np.empty_like(board.black))
-    _relax(
-        board, before, factor, _SWEEPS_PER_CELL * (gap + 10), tolerance, np.zeros(_SWEEPS_AT_ONCE, np.int64)
-    )
-    _take_in(board, heights)
-    return heights
+    neighbours = ndimage.convolve(np.ones(fixed.shape), _CROSS, mode="constant")
+    shares = np.where(fixed, 0.0, factor / np.maximum(neighbours, 1.0))
+    (white, black), each = _by_colour(heights), _by_colour(shares)
+    _relax(white, black, *each, factor, _SWEEPS_PER_CELL * (gap + 10), tolerance)
+    relaxed = np.empty((len(white), white.shape[1], 2))
+    rows = np.arange(len(white))
+    relaxed[rows, :, (rows + 1) % 2], relaxed[rows, :, rows % 2] = white, black
+    return relaxed.reshape(len(white), -1)[1:-1, 1 : heights.shape[1] + 1].copy()
 
 
-class Board(NamedTuple):
-    """Columns like the squares of a chessboard, with a margin of zeros; those of a colour beside each other.
+def _by_colour(columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return columns (X, Y) by the two colours of a chessboard: those with an odd i + j, and the others.
 
-    In row i the square j is the (j // 2)th one of its colour, so that W = (Y + 3) // 2.
+    Each is (X + 2, W), with a margin of zeros: column j is the (j // 2)th one of its colour in its row.
     """
-
-    white: np.ndarray
-    """(X + 2, W) float64, heights where i + j is odd."""
-    black: np.ndarray
-    """(X + 2, W) float64, the others."""
-    white_shares: np.ndarray
-    """(X + 2, W) float64: of columns to relax, the factor over how many neighbours they have, or 0."""
-    black_shares: np.ndarray
-    """(X + 2, W) float64, likewise."""
-
-
-def _new_board(rows: int, columns: int) -> Board:
-    """Return an empty board of (X, Y) squares."""
-    shape = rows + 2, (columns + 3) // 2
-    return Board(*(np.zeros(shape) for _ in range(4)))
+    padded = np.pad(columns, ((1, 1), (1, 1 + columns.shape[1] % 2)))
+    pairs, rows = padded.reshape(len(padded), -1, 2), np.arange(len(padded))
+    return pairs[rows, :, (rows + 1) % 2], pairs[rows, :, rows % 2]
 
 
 @lean_kernel
-def _set_out(board, heights, fixed, gaps):
-    """Put heights on a board; returns the widest gap, in steps from a column to the nearest fixed one.
+def _relax(white, black, white_shares, black_shares, factor, sweeps, tolerance):
+    """Relax heights by successive over-relaxation, in place, until they hardly change.
+
+    Errors fall by ω - 1 a sweep, so that changes below (2 - ω) of the tolerance leave less than it.
 
     Args:
-        heights: (X, Y) float64.
-        fixed: (X, Y) bool, at least one of them.
-        gaps: (X, Y) int32, scratch space.
+        white: (X + 2, W) float64, heights of one colour, which a sweep relaxes first; see `_by_colour`.
+        black: (X + 2, W) float64, those of the other.
+        white_shares: (X + 2, W) float64: of columns to relax, ω over how many neighbours they have, or 0.
+        black_shares: (X + 2, W) float64, likewise.
+        factor: ω.
+        sweeps: Most sweeps.
     """
-    rows, columns = heights.shape
-    far = np.int32(rows + columns)
-    for i in range(rows):
-        for j in range(columns):
-            squares = board.white if (i + j) % 2 == 1 else board.black  # the margin moves both by one
-            squares[i + 1, (j + 1) // 2] = heights[i, j]
-            gap = np.int32(0) if fixed[i, j] else far
-            if i > 0:
-                gap = min(gap, gaps[i - 1, j] + np.int32(1))
-            if j > 0:
-                gap = min(gap, gaps[i, j - 1] + np.int32(1))
-            gaps[i, j] = gap
-    widest = np.int32(0)
-    for i in range(rows - 1, -1, -1):
-        for j in range(columns - 1, -1, -1):
-            gap = gaps[i, j]
-            if i + 1 < rows:
-                gap = min(gap, gaps[i + 1, j] + np.int32(1))
-            if j + 1 < columns:
-                gap = min(gap, gaps[i, j + 1] + np.int32(1))
-            gaps[i, j] = gap
-            widest = max(widest, gap)
-    return widest
+    limit = (2.0 - factor) * tolerance
+    for _ in range(sweeps):
+        moving = _relax_colour(white, black, white_shares, factor, 1, limit)
+        moving += _relax_colour(black, white, black_shares, factor, 0, limit)
+        if moving == 0:
+            return
 
 
 @lean_kernel
-def _share_out(board, fixed, factor):
-    """Fill in the shares of the columns that are not fixed."""
-    rows, columns = fixed.shape
-    for i in range(rows):
-        for j in range(columns):
-            if not fixed[i, j]:
-                neighbours = (i > 0) + (i + 1 < rows) + (j > 0) + (j + 1 < columns)
-                shares = board.white_shares if (i + j) % 2 == 1 else board.black_shares
-                shares[i + 1, (j + 1) // 2] = factor / max(neighbours, 1)
+def _relax_colour(own, other, shares, factor, white, limit):
+    """Relax the squares of a colour; returns how many changed by more than a limit.
 
-
-@lean_kernel
-def _take_in(board, heights):
-    """Fill in (X, Y) heights from a board."""
-    rows, columns = heights.shape
-    for i in range(rows):
-        for j in range(columns):
-            squares = board.white if (i + j) % 2 == 1 else board.black
-            heights[i, j] = squares[i + 1, (j + 1) // 2]
-
-
-@lean_kernel
-def _relax(board, before, factor, sweeps, tolerance, moving):
-    """Successive over-relaxation by ω, `factor`: all white squares, then all black ones, in a sweep.
-
-    Errors fall by ω - 1 a sweep, so that changes below (2 - ω) of the tolerance leave less than it. Some
-    sweeps go over the rows together, each two rows behind the one before: the rows stay in the cache. Where
-    the first of them was the last that is needed, they are taken back, and it is done alone. Scratch space:
-    `before`, another Board, and `moving`, (S,) int64 for S sweeps together.
+    The margin's squares are relaxed, too, and do not change: their shares are 0.
     """
-    limit, left = (2.0 - factor) * tolerance, sweeps
-    while left > 0:
-        together = min(len(moving), left)
-        _copy(board.white, before.white)
-        _copy(board.black, before.black)
-        _sweep(board, factor, limit, together, moving)
-        needed = 0
-        while needed < together and moving[needed] > 0:
-            needed += 1
-        if needed == together:
-            left -= together
-            continue
-        if needed + 1 < together:
-            _copy(before.white, board.white)
-            _copy(before.black, board.black)
-            _sweep(board, factor, limit, needed + 1, moving)
-        break
-
-
-@inlined_kernel
-def _copy(source, target):
-    """Copy numbers from one array to another of the same shape."""
-    for row in range(source.shape[0]):
-        for column in range(source.shape[1]):
-            target[row, column] = source[row, column]
-
-
-@lean_kernel
-def _sweep(board, factor, limit, together, moving):
-    """Relax every square this many times; `moving` counts those that a sweep changed by more than a limit."""
-    rows = len(board.white) - 2
-    for sweep in range(together):
-        moving[sweep] = 0
-    for front in range(_ROWS_AT_ONCE, rows + 2 * together + _ROWS_AT_ONCE, _ROWS_AT_ONCE):
-        for sweep in range(together):
-            last = front - 2 * sweep
-            moving[sweep] += _relax_rows(board.white, board.black, board.white_shares, factor, last, 1, limit)
-            moving[sweep] += _relax_rows(
-                board.black, board.white, board.black_shares, factor, last - 1, 0, limit
-            )
-
-
-@lean_kernel
-def _relax_rows(own, other, shares, factor, last, white, limit):
-    """Relax the squares of a colour in some rows; returns how many changed by more than a limit.
-
-    The margin's squares are relaxed, too, and do not change: their shares are 0. The rows are those within
-    the board of the `_ROWS_AT_ONCE` rows that end with the last one.
-    """
-    count = 0
-    for row in range(max(last - _ROWS_AT_ONCE + 1, 1), min(last, own.shape[0] - 2) + 1):
+    count, width = 0, own.shape[1]
+    for row in range(1, own.shape[0] - 1):
         odd = (row + white) % 2
-        cells, part = own[row, 1 - odd : own.shape[1] - odd], shares[row, 1 - odd : own.shape[1] - odd]
-        above, below = (
-            other[row - 1, 1 - odd : own.shape[1] - odd],
-            other[row + 1, 1 - odd : own.shape[1] - odd],
-        )
-        left, right = other[row, : own.shape[1] - 1], other[row, 1:]
+        cells, part = own[row, 1 - odd : width - odd], shares[row, 1 - odd : width - odd]
+        above, below = other[row - 1, 1 - odd : width - odd], other[row + 1, 1 - odd : width - odd]
+        left, right = other[row, : width - 1], other[row, 1:]
         for k in range(len(cells)):  # contiguous, and without a branch: the compiler makes vectors of it
             beside = above[k] + below[k] + left[k] + right[k]
             change = part[k] * beside - factor * cells[k]
