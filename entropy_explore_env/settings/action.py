@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from entropy_explore_env.settings.validation import check_choice, check_count
+from entropy_explore_env.settings.validation import check_count, check_fields
 
 MAX_CANDIDATES = 64
 """Most viewpoints that are proposed to a robot: 64 bits of a number note which of them see a voxel."""
@@ -33,8 +33,7 @@ class Action:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check_choice(self, "kind")
-        check_choice(self, "moves")
+        check_fields(self)
         check_count(self, "yaws", 1, 360)
         check_count(self, "pitches", 1, 90)
         check_count(self, "candidates", 1, MAX_CANDIDATES)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.settings.validation import check, check_choice, check_count, check_kind, check_within
+from entropy_explore_env.settings.validation import check, check_count, check_fields, check_within
 
 BITS_PER_MEASUREMENT = 96
 BITS_PER_RECEIPT = 48
@@ -104,7 +104,7 @@ class Channel:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check_choice(self, "content")
+        check_fields(self)
         check_within(self, "summary_every_s", least=1e-3, most=3600, zero=True)
         check_within(self, "summary_threshold_bits", least=0, most=5)
         check_count(self, "burst", 0, 1_000_000)
@@ -113,12 +113,8 @@ class Channel:
             check(self, "i_min_fill", "None, or a number above 0 up to 10", lambda v: 0 < v <= 10)
             check(self, "i_min_bits", "above 0 where I_min is steered", lambda v: v > 0)
         check_within(self, "range_m", least=1e-9, most=1e6, inf=True)
-        check_choice(self, "reach")
-        check_choice(self, "order")
-        check_kind(self, "signal", Signal)
         check(self, "loss_probability", "a number from 0 to 1", lambda v: 0 <= v <= 1)
         check(self, "delay_s", "a number from 0 to 3600", lambda v: 0 <= v <= 3600)
-        check_kind(self, "announcements", bool)
         check_within(self, "phase_s", least=1e-3, most=3600, zero=True)
         check_count(self, "repeats", 1, 1000)
         self._check_contents()

@@ -8,7 +8,7 @@ from typing import Literal
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.grid import MAX_VOXELS
-from entropy_explore_env.settings.validation import check, check_choice, check_count, check_kind, check_within
+from entropy_explore_env.settings.validation import check, check_count, check_fields, check_within
 
 BITS_OF_UNIT_GAUSSIAN = 0.5 * math.log2(2.0 * math.pi * math.e)
 """Differential entropy of N(0, 1) in bits: Rocha04, eq. 15 at σ = 1."""
@@ -68,9 +68,9 @@ class Ending:
 
     def __post_init__(self) -> None:
         """Check every field."""
+        check_fields(self)
         allowed = f"a number from 1e-4 to below {SIGMA_PRIOR:g}, the σ of what was never measured"
         check(self, "sigma_end", allowed, lambda v: 1e-4 <= v < SIGMA_PRIOR)
-        check_choice(self, "termination")
         if self.seen_share is not None:
             check(self, "seen_share", "None, or a number above 0 up to 1", lambda v: 0 < v <= 1)
         if self.unseen_free_voxels is not None:
@@ -78,7 +78,6 @@ class Ending:
             if self.seen_share is not None:
                 allowed = "None where seen_share is given"
                 raise SettingError("Ending.unseen_free_voxels", self.unseen_free_voxels, allowed)
-        check_kind(self, "return_to_start", bool)
         if self.return_to_start and (not self.by_seen or self.termination in ("shared", "one")):
             allowed = "False, unless a mission ends by what the team has seen, and termination is any or all"
             raise SettingError("Ending.return_to_start", True, allowed)

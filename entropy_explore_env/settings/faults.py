@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field, fields
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.settings.validation import check, check_kind, check_within, is_whole
+from entropy_explore_env.settings.validation import check, check_fields, check_within, is_whole
 
 _MOST_ROBOTS = 1000
 
@@ -139,10 +139,7 @@ class Faults:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        for name in ("stop", "blind", "silent"):
-            check_kind(self, name, Outage)
-        check_kind(self, "sensor", SensorFault)
-        check_kind(self, "radio", RadioFault)
+        check_fields(self)
 
     @property
     def parts(self) -> dict[str, Outage | SensorFault | RadioFault]:

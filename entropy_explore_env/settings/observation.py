@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Literal
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.settings.validation import check_choice, check_count, check_counts, check_kind
+from entropy_explore_env.settings.validation import check_count, check_counts, check_fields
 
 MOST_PREDICTED = 111
 """Most cells of a prediction along an axis: a crop of the network has 128, and its place is not quite in the
@@ -62,13 +62,10 @@ class Observation:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        for each in fields(self):
-            if isinstance(each.default, bool):
-                check_kind(self, each.name, bool)
+        check_fields(self)
         if self.panorama_yaws is not None:
             check_count(self, "panorama_yaws", 1, 360)
         check_count(self, "panorama_pitches", 1, 90)
-        check_choice(self, "panorama_utility")
         check_counts(self, "patch_shape", 1, 255)
         if not all(n % 2 for n in self.patch_shape):
             raise SettingError("Observation.patch_shape", self.patch_shape, "odd numbers only")

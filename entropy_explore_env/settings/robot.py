@@ -8,7 +8,7 @@ from typing import Literal
 
 from entropy_explore_env.errors import SettingError, did_you_mean
 from entropy_explore_env.settings.localization import Localization
-from entropy_explore_env.settings.validation import check, check_choice, check_kind, check_within, is_number
+from entropy_explore_env.settings.validation import check, check_fields, check_within, is_number
 
 MIN_REDECIDE_S = 0.01
 """A shorter period between decisions under way would only cost time."""
@@ -65,25 +65,21 @@ class Robot:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check_choice(self, "motion")
-        check_choice(self, "navigator")
+        check_fields(self)
         check(self, "unknown_cost", "a number from 1 to 1e6", lambda v: 1.0 <= v <= 1e6)
         check_within(self, "reach_m", least=1e-6, most=1e6, inf=True)
         check_within(self, "max_speed_m_s", least=1e-4, most=1e4)
         check_within(self, "acceleration_m_s2", least=1e-4, most=1e6)
         check_within(self, "turn_rate_rad_s", least=1e-4, most=1e6, inf=True)
         check_within(self, "body_radius_m", "sensor_height_m", least=0, most=1e6)
-        check_kind(self, "tilts", bool)
         if self.above_ground_m is not None:
             check(self, "above_ground_m", "None, or a number from 1e-6 to 1e6", lambda v: 1e-6 <= v <= 1e6)
-        check_choice(self, "when_blocked")
         check_within(self, "blocked_wait_s", least=1e-4, most=1e5)
         periodic = is_number(self.redecide) and MIN_REDECIDE_S <= self.redecide < math.inf
         if not periodic and not (isinstance(self.redecide, str) and self.redecide in _REDECIDE):
             allowed = f"one of {', '.join(_REDECIDE)}, or a finite number of seconds ≥ {MIN_REDECIDE_S}"
             allowed += did_you_mean(self.redecide, _REDECIDE)
             raise SettingError("Robot.redecide", self.redecide, allowed)
-        check_kind(self, "localization", Localization)
 
     @property
     def planning_radius_m(self) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.sensor import RangeSensor
-from entropy_explore_env.settings.validation import check_kind
+from entropy_explore_env.settings.validation import check_fields
 
 
 @dataclass(frozen=True)
@@ -20,8 +20,7 @@ class RobotKind:
 
     def __post_init__(self) -> None:
         """Check every field."""
-        check_kind(self, "robot", Robot)
-        check_kind(self, "sensor", RangeSensor)
+        check_fields(self)
         if self.robot.redecide == "on_scan" and math.isinf(self.sensor.scan_every_m):
             allowed = "at_stop or a period, where RangeSensor.scan_every_m is inf"
             raise SettingError("Robot.redecide", self.robot.redecide, allowed)

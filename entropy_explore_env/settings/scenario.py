@@ -22,7 +22,7 @@ from entropy_explore_env.settings.reward import Reward
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.sensor import RangeSensor
-from entropy_explore_env.settings.validation import check_choice, check_count, check_kind, check_within
+from entropy_explore_env.settings.validation import check_count, check_fields, check_within
 
 MAX_IN_FLIGHT = 2**24
 """Measurements of delayed messages that may be under way at once."""
@@ -92,8 +92,7 @@ class Scenario:
 
     def __post_init__(self) -> None:
         """Check every field, and that the parts fit each other; level the sensor in a 2-D world."""
-        for name, kind in (("name", str), ("world", str), ("grid", Grid), *_PARTS):
-            check_kind(self, name, kind)
+        check_fields(self)
         if not isinstance(self.extra_kinds, tuple) or not all(
             isinstance(o, RobotKind) for o in self.extra_kinds
         ):
@@ -102,12 +101,10 @@ class Scenario:
             object.__setattr__(self, "sensor", _level(self.sensor))
             extra_kinds = tuple(RobotKind(kind.robot, _level(kind.sensor)) for kind in self.extra_kinds)
             object.__setattr__(self, "extra_kinds", extra_kinds)
-        check_choice(self, "split")
         check_count(self, "robots", 1, 1000)
         check_within(self, "start_radius_m", least=1e-6, most=1e6, inf=True)
         if self.decision_period_s is not None:
             check_within(self, "decision_period_s", least=1e-3, most=1e5)
-        check_kind(self, "track_truth", bool)
         if self.ending.by_seen:
             object.__setattr__(self, "track_truth", True)
         if self.observation.overlaps and self.action.kind != "candidates":
@@ -368,16 +365,3 @@ def driving_time_s(robot: Robot, length_m: float) -> float:
 def _level(sensor: RangeSensor) -> RangeSensor:
     """Return the sensor without pitch."""
     return dataclasses.replace(sensor, field_of_view_rad=(sensor.field_of_view_rad[0], 0.0))
-
-
-_PARTS: tuple[tuple[str, type], ...] = (
-    ("robot", Robot),
-    ("sensor", RangeSensor),
-    ("channel", Channel),
-    ("faults", Faults),
-    ("fiducials", Fiducials),
-    ("ending", Ending),
-    ("reward", Reward),
-    ("action", Action),
-    ("observation", Observation),
-)

@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, TypeGuard, get_args, get_type_hints
+from typing import Any, Literal, TypeGuard, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -130,6 +130,15 @@ def annotations_of(kind: type) -> dict[str, Any]:
     """Return the evaluated annotation of each field of a dataclass, by name."""
     hints = get_type_hints(kind)
     return {field.name: hints[field.name] for field in dataclasses.fields(kind)}
+
+
+def check_fields(settings: object) -> None:
+    """Check each field that is annotated as a bool, a text, one of some words, or a part of the settings."""
+    for name, kind in annotations_of(type(settings)).items():
+        if get_origin(kind) is Literal:
+            check_choice(settings, name)
+        elif isinstance(kind, type) and (kind in (bool, str) or dataclasses.is_dataclass(kind)):
+            check_kind(settings, name, kind)
 
 
 def check_kind(settings: object, name: str, kind: type) -> None:
