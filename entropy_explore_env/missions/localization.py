@@ -69,28 +69,6 @@ def pose_errors(estimates: np.ndarray) -> list[tuple[float, float]]:
     return [(math.sqrt(x * x + y * y + z * z), abs(yaw)) for x, y, z, yaw in estimates["error"].tolist()]
 
 
-def localization_figures(estimates: np.ndarray, scans: int) -> dict[str, float | int | None]:
-    """Return how wrong a team was about its poses, for tables and records.
-
-    Args:
-        scans: That it has taken.
-
-    Returns:
-        `rms_error_m` and `rms_error_rad`, root mean square over all scans: None before the first one;
-        `mean_error_m` and `mean_error_rad` of the robots at last; `sightings` of fiducials.
-    """
-    errors = pose_errors(estimates)
-    squares = (float(estimates["squared_m2"].sum()), float(estimates["squared_rad2"].sum()))
-    rms_m, rms_rad = (math.sqrt(total / scans) if scans else None for total in squares)
-    return {
-        "rms_error_m": rms_m,
-        "rms_error_rad": rms_rad,
-        "mean_error_m": sum(off_m for off_m, _ in errors) / len(errors),
-        "mean_error_rad": sum(off_rad for _, off_rad in errors) / len(errors),
-        "sightings": int(estimates["sightings"].sum()),
-    }
-
-
 @lean_kernel
 def localization_of(params, estimates, fiducials, landmarks, mission):
     """Return the TeamLocalization of a mission; None where no robot drifts."""
@@ -141,14 +119,6 @@ def believed_pose(estimate, params, pose):
         believed_yaw(estimate, pose[3]),
         pose[4],
     )
-
-
-@lean_kernel
-def believe_pose(estimate, params, pose):
-    """Turn a robot's true pose (5,), in place, into where it believes to be: see `believed_pose`."""
-    if estimate is None:  # known while compiling: nothing of the rest is compiled
-        return
-    copy_numbers(believed_pose(estimate, params, pose), pose, 5)
 
 
 @lean_kernel
@@ -256,10 +226,14 @@ def whole_pose(pose):
 
 @lean_kernel
 def note_covariance(localization, index, covariances, slot):
-    """Put the covariance of a robot's latest scan beside a batch of its measurements, if batches have one."""
+    """Put the covariance of a robot's latest scan beside a batch of its measurements, if batches have one.
+
+    The slot is the index of the batch among the covariances, a number or a tuple.
+    """
     if localization is None:  # known while compiling: nothing of the rest is compiled
         return
-    copy_numbers(localization.estimates[index].packed, covariances[slot], covariances.shape[1])
+    packed = localization.estimates[index].packed
+    copy_numbers(packed, covariances[slot], len(packed))
 
 
 @lean_kernel

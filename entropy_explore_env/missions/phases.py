@@ -110,28 +110,11 @@ def collect_batch(phases, team, scan, index, count):
         return True
     batch = phases.batches[index, side, place]
     copy_numbers(believed_scan_pose(team.localization, team.robots[index], index), batch.pose, 5)
-    collect_covariance(team.localization, phases, index, side, place)
+    note_covariance(team.localization, index, phases.covariances, (index, side, place))
     batch.count = count
     pack_measurements(scan, count, phases.rays[index, side, place])
     phases.counts[index, side] = place + 1
     return True
-
-
-@lean_kernel
-def collect_covariance(localization, phases, index, side, place):
-    """Put the covariance of a robot's latest scan beside the batch at a place of its buffer."""
-    if localization is None:  # known while compiling: nothing of the rest is compiled
-        return
-    note_covariance(localization, index, phases.covariances[index, side], place)
-
-
-@lean_kernel
-def weigh_collected(localization, voxel_size_m, phases, index, side, place, scan):
-    """Lower the precision of a collected batch's measurements, unpacked into `scan`, by its covariance."""
-    if localization is None:  # known while compiling: nothing of the rest is compiled
-        return
-    count, covariances = phases.batches[index, side, place].count, phases.covariances[index, side]
-    weigh_batch(localization, covariances, place, scan, count, voxel_size_m)
 
 
 @lean_kernel
@@ -181,9 +164,8 @@ def broadcast(phases, team, maps, side, index, time_s, tracer, scan, recipients)
             elif heard[mate] == _NOW:
                 if not traced:
                     unpack_measurements(params[0], tracer, index, scan, batch.pose, packed, batch.count)
-                    weigh_collected(
-                        team.localization, params[0].voxel_size_m, phases, index, side, place, scan
-                    )
+                    beside, edge_m = (index, side, place), params[0].voxel_size_m
+                    weigh_batch(team.localization, phases.covariances, beside, scan, batch.count, edge_m)
                     traced = True
                 note_message(robots[mate], team.heard[mate, index], said, time_s, batch.count, batch_bits)
                 hear_batch(team, maps, scan, mate, batch.count)

@@ -23,7 +23,7 @@ import math
 from entropy_explore_env.belief.raycast import point
 from entropy_explore_env.compilation.kernels import lean_kernel, record_type
 from entropy_explore_env.missions.action import decode_action
-from entropy_explore_env.missions.localization import believe_pose
+from entropy_explore_env.missions.localization import believed_pose
 from entropy_explore_env.missions.poses import (
     copy_numbers,
     distance_between,
@@ -68,7 +68,7 @@ def decide(params, actions, robot, estimate, time_s, continuous, discrete, choic
     copy_numbers(robot.goal, choice.pose, 5)
     if robot.under_way:
         copy_numbers(pose_at(params, robot, time_s), choice.pose, 5)
-    believe_pose(estimate, params, choice.pose)
+    copy_numbers(believed_pose(estimate, params, choice.pose), choice.pose, 5)
     decode_action(params, actions, choice.pose, continuous, discrete, choice.viewpoint)
     copy_numbers(choice.pose, choice.start, 3)
     copy_numbers(choice.viewpoint, choice.path[0], 3)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from entropy_explore_env.missions.faults import fault_counts
-from entropy_explore_env.missions.localization import localization_figures
+from entropy_explore_env.missions.localization import pose_errors
 from entropy_explore_env.missions.records import COUNTED, SEEN_MARKS, MissionEnd
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.robots.range_sensor import (
@@ -122,13 +122,25 @@ def _holding(missions: Missions, mission: int) -> np.ndarray:
 
 
 def localization_told(missions: Missions, mission: int) -> dict[str, float | int | None]:
-    """Return how wrong a mission's robots were about their poses: see `localization_figures`.
+    """Return how wrong a mission's robots were about their poses, for tables and records.
 
-    Where they keep landmarks of their own maps, also `own_sightings` of those that they still keep, after the
-    scans that chose them.
+    Returns:
+        `rms_error_m` and `rms_error_rad`, root mean square over all scans: None before the first one;
+        `mean_error_m` and `mean_error_rad` of the robots at last; `sightings` of fiducials. Where robots keep
+        landmarks of their own maps, also `own_sightings` of those that they still keep, after the scans that
+        chose them.
     """
     robots, estimates = missions.state.robots[mission], missions.state.estimates[mission]
-    told = localization_figures(estimates, int(robots["scans"].sum()))
+    scans, errors = int(robots["scans"].sum()), pose_errors(estimates)
+    squares = (float(estimates["squared_m2"].sum()), float(estimates["squared_rad2"].sum()))
+    rms_m, rms_rad = (math.sqrt(total / scans) if scans else None for total in squares)
+    told = {
+        "rms_error_m": rms_m,
+        "rms_error_rad": rms_rad,
+        "mean_error_m": sum(off_m for off_m, _ in errors) / len(errors),
+        "mean_error_rad": sum(off_rad for _, off_rad in errors) / len(errors),
+        "sightings": int(estimates["sightings"].sum()),
+    }
     landmarks = missions.state.landmarks[mission]
     if landmarks.size:
         told["own_sightings"] = int(landmarks["sightings"][landmarks["used"]].sum())
