@@ -56,54 +56,6 @@ def in_cone(cone, dx, dy, dz):
 
 
 @inlined_kernel
-def _column_span(cone, dx, dy, layers):
-    """Return the first and one past the last layer of a column of voxels whose centres may lie in a cone.
-
-    The column stands at (dx, dy) from the apex. Up to α = 90° a cone is convex and what is in it lies between
-    two heights, the roots of (A + gz)² = cos²α (dx² + dy² + z²), checked for rounding; beyond, they are those
-    of the ball, and whether a centre is inside is for `in_cone` to say.
-    """
-    flat = dx * dx + dy * dy
-    radius = min(cone.radius, _FARTHEST)
-    high = radius * radius - flat
-    if high < 0.0:
-        return 0, 0
-    high = math.sqrt(high)
-    low = -high
-    if cone.cosine >= 0.0:
-        up, along = cone.gaze[2], dx * cone.gaze[0] + dy * cone.gaze[1]
-        squared = cone.cosine * cone.cosine
-        a, half_b, c = up * up - squared, along * up, along * along - squared * flat
-        root = half_b * half_b - a * c
-        if a < -_SLACK:
-            if root < -_SLACK:
-                return 0, 0
-            root = math.sqrt(max(root, 0.0))
-            low, high = max(low, (root - half_b) / a), min(high, -(root + half_b) / a)
-        elif a > _SLACK and root >= 0.0:
-            if up > 0.0:
-                low = max(low, (math.sqrt(root) - half_b) / a)
-            else:
-                high = min(high, -(math.sqrt(root) + half_b) / a)
-    first = math.floor(cone.apex[2] + low - 0.5)
-    last = math.floor(cone.apex[2] + high - 0.5) + 2
-    first, last = max(first, 0), min(last, layers)
-    if cone.cosine >= 0.0:
-        while first < last and not in_cone(cone, dx, dy, first + 0.5 - cone.apex[2]):
-            first += 1
-        while first < last and not in_cone(cone, dx, dy, last - 0.5 - cone.apex[2]):
-            last -= 1
-    return first, last
-
-
-@inlined_kernel
-def _visible(cone, i, j, k):
-    """Return whether a voxel of a column's span is visible."""
-    dx, dy, dz = i + 0.5 - cone.apex[0], j + 0.5 - cone.apex[1], k + 0.5 - cone.apex[2]
-    return cone.cosine >= 0.0 or in_cone(cone, dx, dy, dz)
-
-
-@inlined_kernel
 def _span(cone, axis, size):
     """Return the first and one past the last index along an axis whose centres may lie in a cone.
 
@@ -128,11 +80,11 @@ def mark_cones(cones, size, marks):
     for cone in cones:
         first_x, last_x = _span(cone, 0, size[0])
         first_y, last_y = _span(cone, 1, size[1])
+        first_z, last_z = _span(cone, 2, size[2])
         for i in range(first_x, last_x):
             for j in range(first_y, last_y):
-                first, last = _column_span(cone, i + 0.5 - cone.apex[0], j + 0.5 - cone.apex[1], size[2])
-                for k in range(first, last):
-                    if _visible(cone, i, j, k):
+                for k in range(first_z, last_z):
+                    if in_cone(cone, i + 0.5 - cone.apex[0], j + 0.5 - cone.apex[1], k + 0.5 - cone.apex[2]):
                         marks[np.uint32(flat_index(size, i, j, k))] = 1
 
 
@@ -150,11 +102,11 @@ def visible_bits(cone, size, precision, known_precision, marks):
     own, shared, own_growth, shared_growth = 0.0, 0.0, np.float64(1.0), np.float64(1.0)
     first_x, last_x = _span(cone, 0, size[0])
     first_y, last_y = _span(cone, 1, size[1])
+    first_z, last_z = _span(cone, 2, size[2])
     for i in range(first_x, last_x):
         for j in range(first_y, last_y):
-            first, last = _column_span(cone, i + 0.5 - cone.apex[0], j + 0.5 - cone.apex[1], size[2])
-            for k in range(first, last):
-                if _visible(cone, i, j, k):
+            for k in range(first_z, last_z):
+                if in_cone(cone, i + 0.5 - cone.apex[0], j + 0.5 - cone.apex[1], k + 0.5 - cone.apex[2]):
                     voxel = np.uint32(flat_index(size, i, j, k))
                     ratio = max(known_precision / precision[voxel], 1.0)
                     if marks[voxel] > 0:
