@@ -26,7 +26,6 @@ from entropy_explore_env.robots.range_sensor import (
     Scene,
     SensorPose,
     first_rays,
-    in_view,
     take_scan,
     visibility_parameters,
 )
@@ -42,7 +41,7 @@ def scan_and_share(mission, sensor, index, work):
     scan = first_rays(work.scan, params.rays)
     x, y, z, yaw, pitch = pose_at(params, robot, clock.time_s)
     pose = SensorPose(within_grid(params, (x, y, z)), yaw, pitch)
-    bodies = work.bodies[: place_bodies(team, sensor, index, clock.time_s, pose, work.bodies)]
+    bodies = work.bodies[: place_bodies(team, index, clock.time_s, work.bodies)]
     scene = Scene(mission.truth, grid_size(params), params.voxel_size_m, bodies)
     if not blinded(team.faults, index, clock.time_s):
         sight_fiducials(team.localization, params, index, sensor, scene, pose)
@@ -111,8 +110,8 @@ def share(mission, scan, sensor, index, recipients):
 
 
 @lean_kernel
-def place_bodies(team, sensor, index, time_s, pose, bodies):
-    """Put the teammates' bodies that the robot may see, in grid units, into `bodies`; returns how many."""
+def place_bodies(team, index, time_s, bodies):
+    """Put the bodies of a robot's teammates, in grid units, into `bodies`; returns how many."""
     count = 0
     for mate in range(len(team.robots)):
         params = team.params[mate]
@@ -120,6 +119,5 @@ def place_bodies(team, sensor, index, time_s, pose, bodies):
             place = to_grid_units(params, pose_at(params, team.robots[mate], time_s))
             copy_numbers(place, bodies[count], 3)
             bodies[count, 3] = params.body_radius_m / params.voxel_size_m
-            if in_view(sensor, pose, bodies[count]):
-                count += 1
+            count += 1
     return count

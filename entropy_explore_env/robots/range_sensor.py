@@ -94,7 +94,7 @@ class Scene(NamedTuple):
     """(X, Y, Z) voxels."""
     voxel_size_m: float
     bodies: np.ndarray
-    """(B, 4) float64: centre and radius in grid units of each body that may be seen."""
+    """(B, 4) float64: centre and radius in grid units of each body."""
 
 
 def true_coverage(occupied: np.ndarray, unreadable: np.ndarray | None) -> np.ndarray:
@@ -194,27 +194,6 @@ def point_rays(model, yaw, pitch, rays):
                 ray.cos_pitch = rays[row].cos_pitch
                 ray.direction[2] = rays[row].direction[2]
             ray.direction[0], ray.direction[1] = along * ray.cos_pitch, across * ray.cos_pitch
-
-
-@lean_kernel
-def in_view(model, pose, body):
-    """Return whether a body may be hit by a ray of the bundle around a gaze.
-
-    Conservative: may be True for bodies outside the view. A ray's angle from the gaze is at most the bundle's
-    half diagonal in yaw and pitch.
-
-    Args:
-        body: (4,) float64 centre and radius in grid units.
-    """
-    yaw, pitch = pose.yaw, pose.pitch
-    x, y, z = body[0] - pose.start[0], body[1] - pose.start[1], body[2] - pose.start[2]
-    distance = math.sqrt(x * x + y * y + z * z)
-    if distance <= body[3]:
-        return True
-    half = math.sqrt(model.yaw_offsets[-1] ** 2 + model.pitch_offsets[-1] ** 2)
-    widest = half + math.asin(body[3] / distance)
-    ahead = (x * math.cos(yaw) + y * math.sin(yaw)) * math.cos(pitch) - z * math.sin(pitch)
-    return widest >= math.pi or ahead >= distance * math.cos(widest) - 1e-9
 
 
 @inlined_kernel

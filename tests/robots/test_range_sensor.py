@@ -14,7 +14,6 @@ from entropy_explore_env.robots.range_sensor import (
     Scene,
     SensorPose,
     body_distance,
-    in_view,
     new_scan,
     sensor_model,
     take_scan,
@@ -207,33 +206,6 @@ def test_the_first_body_on_a_ray(seed, count):
         )
         first = body_distance(tuple(start.tolist()), tuple(direction.tolist()), bodies[:count])
         assert first == pytest.approx(expected, rel=1e-7, abs=1e-7)
-
-
-@drawn(60)
-@given(seeds)
-def test_a_body_that_a_ray_hits_is_in_view(seed):
-    rng = np.random.default_rng(seed)
-    view = rng.uniform(0, [2 * math.pi, math.pi])
-    sensor = RangeSensor((view[0], view[1]), 0.3)
-    yaw, pitch, start = rng.uniform(-math.pi, math.pi), rng.uniform(-1.5, 1.5), np.array([3.5, 5.5, 2.5])
-    scan, model = scan_of(np.zeros(SIZE, np.float32), start, yaw, pitch, sensor), sensor_model(sensor)
-    for offset in rng.normal(size=(20, 3)) * 2:
-        body = np.array([*(start + offset), rng.uniform(0.01, 1.0)])
-        hit = any(
-            rocha04.distance_to_ball(start, ray["direction"], body[:3], body[3]) < math.inf
-            for ray in scan.rays
-        )
-        assert in_view(model, pose_at(start, yaw, pitch), body) or not hit
-
-
-def test_a_body_behind_or_far_aside_is_not_in_view():
-    model, start = sensor_model(RangeSensor()), np.array([3.5, 5.5, 2.5])
-    assert in_view(model, pose_at(start, 0.0, 0.0), np.array([5.5, 5.5, 2.5, 0.1]))
-    assert not in_view(model, pose_at(start, 0.0, 0.0), np.array([1.5, 5.5, 2.5, 0.1]))
-    assert not in_view(model, pose_at(start, 0.0, 0.0), np.array([3.5, 7.5, 2.5, 0.1]))
-    assert in_view(model, pose_at(start, math.pi / 2, 0.0), np.array([3.5, 7.5, 2.5, 0.1]))
-    assert in_view(model, pose_at(start, 0.0, math.pi / 4), np.array([5.5, 5.5, 0.5, 0.1]))
-    assert not in_view(model, pose_at(start, 0.0, -math.pi / 4), np.array([5.5, 5.5, 0.5, 0.1]))
 
 
 def scene_with_a_teammate():
