@@ -1,1 +1,1 @@
-"""What robots observe: the parts of one flat float32 vector, written by compiled code, a part a file."""
+"""What robots observe: the parts of one flat float32 vector, written by compiled code."""

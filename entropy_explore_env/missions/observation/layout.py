@@ -47,8 +47,7 @@ from gymnasium import spaces
 
 from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.missions.observation.overview import OVERVIEW_CHANNELS
-from entropy_explore_env.missions.observation.own_drive import DRIVE_VALUES
-from entropy_explore_env.missions.observation.own_state import SELF_VALUES
+from entropy_explore_env.missions.observation.own_state import DRIVE_VALUES, SELF_VALUES
 from entropy_explore_env.missions.observation.patch import PATCH_CHANNELS
 from entropy_explore_env.missions.observation.predicted import PREDICTION_CHANNELS
 from entropy_explore_env.missions.observation.team import TEAMMATE_VALUES

@@ -10,8 +10,7 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.localization import believed_pose, estimate_in
 from entropy_explore_env.missions.observation.mask import observe_mask
 from entropy_explore_env.missions.observation.overview import observe_overview
-from entropy_explore_env.missions.observation.own_drive import observe_drive
-from entropy_explore_env.missions.observation.own_state import observe_self
+from entropy_explore_env.missions.observation.own_state import observe_drive, observe_self
 from entropy_explore_env.missions.observation.panorama import observe_panorama
 from entropy_explore_env.missions.observation.patch import observe_patch
 from entropy_explore_env.missions.observation.predicted import observe_prediction

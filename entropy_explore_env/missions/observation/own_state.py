@@ -1,13 +1,15 @@
-"""The part `self`: the robot's pose, the time, the entropy of its map, whether it decides, its kind."""
+"""The parts `self` and `drive`: the robot's pose, time, entropy and kind; its speed and chosen viewpoint."""
 
 from __future__ import annotations
 
 import math
 
 from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.missions.observation.team import write_relative
 
 SELF_VALUES = 10
 """Without the kinds of a mixed team."""
+DRIVE_VALUES = 8
 
 
 @lean_kernel
@@ -39,3 +41,13 @@ def entropy_left(params, entropy_bits):
     least = 0.5 * voxels * math.log2(2.0 * math.pi * math.e / params.end_precision)
     span = 0.5 * voxels * math.log2(params.end_precision / params.prior_precision)
     return min(max((entropy_bits - least) / span, 0.0), 1.0)
+
+
+@lean_kernel
+def observe_drive(begin, params, known, row):
+    """Fill (8,): speed as a share of the top speed, and the viewpoint that the robot chose last."""
+    if begin is None:  # known while compiling: nothing of the rest is compiled
+        return
+    out = row[begin:]
+    out[0] = min(known.speed_m_s / params.max_speed_m_s, 1.0)
+    write_relative(params, known.pose, known.target, out[1:])
