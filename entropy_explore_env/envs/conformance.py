@@ -44,11 +44,11 @@ from entropy_explore_env.envs.episodes import (
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.refusals import check_bad_actions, check_call_order
 from entropy_explore_env.missions.records import MissionEnd
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import find_scenario
 from entropy_explore_env.worlds.given import with_given_worlds
-from entropy_explore_env.worlds.load import with_world
 
 BATCH = 8
 _CHILD = "from entropy_explore_env.envs.conformance import answer_parent; answer_parent()"
@@ -285,7 +285,7 @@ def check_conformance(
     """
     limit = {} if steps is None else {"max_cycles": steps}
     asked, given = with_given_worlds(find_scenario(scenario, settings.get("robots")), {**settings, **limit})
-    task = Task(asked if given else with_world(asked), check_seed(seed), given)
+    task = Task(asked if given else Missions(asked).scenario, check_seed(seed), given)
     for check in CHECKS:
         try:
             check(task)

@@ -234,29 +234,15 @@ def make_world(scenario: str | Scenario, world: int | np.random.Generator) -> Wo
 
     Raises:
         SettingError: No scenario, recipe or file has this name, or the number is not a whole number ≥ 0.
-        WorldError: The file cannot be used.
+        WorldError: The file cannot be used, or the grid is too small for the recipe.
     """
     scenario = find_scenario(scenario)
-    if not isinstance(world, np.random.Generator):
-        return world_with_number(scenario, world)
-    if scenario.world in RECIPES:
-        return world_with_number(scenario, draw_world_number(scenario.split, world))
-    return world_from_file(scenario.world, scenario.grid.voxel_size_m)
-
-
-def world_with_number(scenario: Scenario, number: int) -> World:
-    """Return the world that a recipe makes from a world number; without chance in it, the same for all.
-
-    Args:
-        scenario: Its `world` names a recipe, its `grid` the workspace; nothing else matters.
-        number: See worlds/splits.py.
-
-    Raises:
-        SettingError: No recipe has this name, or the number is not a whole number ≥ 0.
-        WorldError: The grid is too small for the recipe.
-    """
+    drawn = isinstance(world, np.random.Generator)
     if scenario.world not in RECIPES:
+        if drawn:
+            return world_from_file(scenario.world, scenario.grid.voxel_size_m)
         raise SettingError("Scenario.world", scenario.world, "a recipe: " + ", ".join(RECIPES))
+    number = draw_world_number(scenario.split, world) if drawn else world
     if not is_whole(number, 0):
         raise SettingError("number", number, "a whole number ≥ 0")
     if scenario.world == "empty":
@@ -307,24 +293,14 @@ def _cached_world(path: Path, version: tuple[int, int], options: tuple[tuple[str
     return load_world(path, **dict(options))
 
 
-def with_world(scenario: Scenario) -> Scenario:
-    """Return the scenario with the grid of its world's file; unchanged where the world is a recipe.
+def world_of_file(scenario: Scenario) -> World | None:
+    """Return the world of the file that a scenario names; None where it names a recipe.
 
-    The scenario's voxel size is kept: the file's voxels are resampled to it.
+    The file's voxels are resampled to the scenario's voxel size.
 
     Raises:
         SettingError: Neither a recipe nor a file has this name.
         WorldError: The file cannot be used.
-    """
-    world = world_of_file(scenario)
-    return scenario if world is None else dataclasses.replace(scenario, grid=world.grid)
-
-
-def world_of_file(scenario: Scenario) -> World | None:
-    """Return the world of the file that a scenario names; None where it names a recipe.
-
-    Raises:
-        SettingError, WorldError: As of `with_world`.
     """
     if scenario.world in RECIPES:
         return None

@@ -23,7 +23,7 @@ from entropy_explore_env.reports.mission_record import (
     save_record,
 )
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.worlds.load import world_with_number
+from entropy_explore_env.worlds.load import make_world
 from entropy_explore_env.worlds.splits import WORLD_NUMBERS
 
 ROOM: dict[str, Any] = {"scenario": "room-furnished", "robots": 3}
@@ -85,7 +85,7 @@ def test_a_world_number_is_the_world_that_the_recipe_makes_of_it() -> None:
     for split, number in (("train", 0), ("train", 7), ("test", WORLD_NUMBERS["test"].start)):
         team = parallel_env(**ROOM, split=split)
         team.reset(seed=1, options={"world": number})
-        expected = world_with_number(team.scenario, number)
+        expected = make_world(team.scenario, number)
         np.testing.assert_array_equal(team.missions.state.truth[0], expected.occupied.ravel())
     worlds = [parallel_env(**ROOM) for _ in range(2)]
     for seed, team in enumerate(worlds):

@@ -13,6 +13,7 @@ from benchmarks.proofs.world_samples import SAMPLES, npz, pgm, sketch
 from entropy_explore_env import EntropyExploreEnv, EntropyExploreVectorEnv
 from entropy_explore_env.envs.episodes import require_same, snapshot
 from entropy_explore_env.errors import SettingError, WorldError
+from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import BOX
 from entropy_explore_env.worlds.files.process import kept_reader
@@ -20,7 +21,6 @@ from entropy_explore_env.worlds.load import (
     load_octomap,
     load_world,
     save_world,
-    with_world,
     world_from_file,
 )
 from entropy_explore_env.worlds.world import World
@@ -96,7 +96,7 @@ def test_settings_that_mean_nothing_for_a_file_are_refused(tmp_path):
 def test_a_scenario_takes_any_file_and_keeps_its_voxel_size(tmp_path):
     path = tmp_path / "plan.pgm"
     path.write_bytes(pgm(np.full((40, 60), 255, np.uint8)))  # 3 × 2 m
-    scenario = with_world(free_box(world=str(path)))
+    scenario = Missions(free_box(world=str(path))).scenario
     assert scenario.grid.voxel_size_m == 0.5
     assert scenario.grid.shape == (6, 4, 1)
     assert world_from_file(path, 0.5) is world_from_file(path, 0.5)  # read once
@@ -200,7 +200,7 @@ def test_a_path_may_be_a_text_and_begin_at_home(tmp_path, monkeypatch):
     assert [file.name for file in (tmp_path / "saved").iterdir()] == ["corner.npz"]
     again = load_world("~/saved/corner.npz")
     np.testing.assert_array_equal(again.occupied, solid)
-    scenario = with_world(free_box(world="~/saved/corner.npz"))
+    scenario = Missions(free_box(world="~/saved/corner.npz")).scenario
     assert scenario.grid.size_m.tolist() == [1.5, 2.0, 1.0]
     with pytest.raises(SettingError, match="below a home folder that exists"):
         load_world("~nobody-of-this-name/corner.npz")

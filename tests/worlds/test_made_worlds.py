@@ -10,7 +10,7 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.randomness import Stream, generator
 from entropy_explore_env.settings.scenarios import BOX, ROOM_FURNISHED, find_scenario
-from entropy_explore_env.worlds.load import make_world, with_world, world_with_number
+from entropy_explore_env.worlds.load import make_world
 from entropy_explore_env.worlds.splits import draw_world_number
 from tests.reference.scenes import free_box
 
@@ -25,7 +25,7 @@ def test_seed_and_episode_determine_the_world_by_its_number():
         first, second = (make_world(ROOM_FURNISHED, rng(seed, episode)) for _ in range(2))
         np.testing.assert_array_equal(first.occupied, second.occupied)
         assert first.grid == ROOM_FURNISHED.grid
-        numbered = world_with_number(ROOM_FURNISHED, draw_world_number("train", rng(seed, episode)))
+        numbered = make_world(ROOM_FURNISHED, draw_world_number("train", rng(seed, episode)))
         np.testing.assert_array_equal(first.occupied, numbered.occupied)
         worlds[first.occupied.tobytes()] = seed, episode
     assert len(worlds) == 3
@@ -53,17 +53,17 @@ def test_an_empty_world_is_shared_by_all_missions():
 @pytest.mark.parametrize("name", ["castle", "castle.xyzzy", "", "octomap"])
 def test_a_world_that_nobody_knows_is_refused(name):
     scenario = free_box(world=name)
-    for ask in (lambda: make_world(scenario, rng(0)), lambda: with_world(scenario)):
+    for ask in (lambda: make_world(scenario, rng(0)), lambda: Missions(scenario)):
         with pytest.raises(SettingError, match=r"Scenario\.world = .*empty, furnished.*\.bt"):
             ask()
     with pytest.raises(SettingError, match=r"Scenario\.world = .*a recipe: empty, furnished"):
-        world_with_number(scenario, 0)
+        make_world(scenario, 0)
 
 
 @pytest.mark.parametrize("number", [-1, 0.5, None, True, "7"])
 def test_a_world_number_that_is_none_is_refused(number):
     with pytest.raises(SettingError, match=r"number = .*whole number"):
-        world_with_number(ROOM_FURNISHED, number)
+        make_world(ROOM_FURNISHED, number)
 
 
 def test_worlds_by_number_are_those_of_missions():

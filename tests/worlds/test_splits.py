@@ -14,7 +14,7 @@ from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import BHATTACHARYA_OFFICE, ROOM_FURNISHED
 from entropy_explore_env.worlds import splits
-from entropy_explore_env.worlds.load import make_world, world_with_number
+from entropy_explore_env.worlds.load import make_world
 from entropy_explore_env.worlds.splits import WORLD_NUMBERS, draw_world_number
 
 
@@ -55,8 +55,8 @@ def test_no_world_repeats_across_splits(scenario):
 def test_the_same_number_is_the_same_world_whatever_the_split():
     number = WORLD_NUMBERS["validation"].start
     scenarios = [with_settings(ROOM_FURNISHED, {"split": split}) for split in WORLD_NUMBERS]
-    first, *others = [world_with_number(scenario, number) for scenario in scenarios]
+    first, *others = [make_world(scenario, number) for scenario in scenarios]
     for other in others:
         np.testing.assert_array_equal(first.occupied, other.occupied)
-    neighbours = world_with_number(ROOM_FURNISHED, number - 1), world_with_number(ROOM_FURNISHED, number + 1)
+    neighbours = make_world(ROOM_FURNISHED, number - 1), make_world(ROOM_FURNISHED, number + 1)
     assert all((first.occupied != other.occupied).any() for other in neighbours)
