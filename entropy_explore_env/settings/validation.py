@@ -38,13 +38,13 @@ def check_whole(name: str, value: object, least: int) -> None:
         raise SettingError(name, value, f"a whole number ≥ {least}")
 
 
-def check_instance(name: str, value: object, kind: type, error: type[SettingError] = SettingError) -> None:
-    """Raise an error unless a value, not a field, is an instance of a class."""
+def check_instance(name: str, value: object, kind: type) -> None:
+    """Raise a SettingError unless a value, not a field, is an instance of a class."""
     if not isinstance(value, kind):
-        raise error(name, value, f"a {kind.__name__}")
+        raise SettingError(name, value, f"a {kind.__name__}")
 
 
-def checked_path(name: str, value: object, allowed: str = "the path of a file") -> Path:
+def checked_path(name: str, value: object) -> Path:
     """Return a path from outside, with `~` at its beginning as the home folder that it stands for.
 
     Raises:
@@ -52,7 +52,7 @@ def checked_path(name: str, value: object, allowed: str = "the path of a file") 
     """
     text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
     if not isinstance(text, str) or "\0" in text:
-        raise SettingError(name, value, allowed)
+        raise SettingError(name, value, "the path of a file")
     try:
         return Path(text).expanduser()
     except RuntimeError:
@@ -66,11 +66,10 @@ def check(settings: object, name: str, allowed: str, accepts: Callable[[Any], bo
         raise SettingError(f"{type(settings).__name__}.{name}", value, allowed)
 
 
-def check_positive(settings: object, *names: str, finite: bool = True) -> None:
-    """Check that each field is a number > 0, finite unless said otherwise."""
-    allowed = "a number > 0" + ("" if finite else ", or inf")
+def check_positive(settings: object, *names: str) -> None:
+    """Check that each field is a finite number > 0."""
     for name in names:
-        check(settings, name, allowed, lambda v: v > 0 and (math.isfinite(v) or not finite))
+        check(settings, name, "a number > 0", lambda v: v > 0 and math.isfinite(v))
 
 
 def check_within(
