@@ -12,6 +12,7 @@ from entropy_explore_env.belief.elevation import completed, elevation_map
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.grid import Grid
 from tests.reference.scenes import drawn, seeds
+from tests.reference.sujan import neighbours_mean
 
 SIZE = (7, 11, 5)
 GRID = Grid(SIZE, 0.5, (1.0, 2.0, -3.0))
@@ -49,24 +50,6 @@ def test_the_ground_is_the_highest_covered_voxel_by_hand():
     assert ground.measurements[[2, 5, 0, 6], [3, 9, 10, 0]] == pytest.approx([4, 1, 3, 0], rel=1e-5)
 
 
-def dense(heights, known):
-    """The limit of the neighbours' means, by a dense linear system."""
-    x, y = heights.shape
-    matrix, right = np.zeros((x * y, x * y)), np.zeros(x * y)
-    for i in range(x):
-        for j in range(y):
-            row = i * y + j
-            matrix[row, row] = 1.0
-            if known[i, j]:
-                right[row] = heights[i, j]
-                continue
-            steps = [(i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)]
-            near = [(a, b) for a, b in steps if 0 <= a < x and 0 <= b < y]
-            for a, b in near:
-                matrix[row, a * y + b] -= 1.0 / len(near)
-    return np.linalg.solve(matrix, right).reshape(x, y)
-
-
 @drawn(60)
 @given(st.tuples(st.integers(1, 23), st.integers(1, 17)), seeds, st.floats(0.02, 1.0))
 def test_unknown_columns_are_completed_as_the_dense_system_says(shape, seed, share):
@@ -74,23 +57,11 @@ def test_unknown_columns_are_completed_as_the_dense_system_says(shape, seed, sha
     heights, known = rng.normal(0.0, 3.0, shape), rng.random(shape) < share
     known[rng.integers(shape[0]), rng.integers(shape[1])] = True
     found = completed(np.where(known, heights, np.nan), known, 1e-6)
-    np.testing.assert_allclose(found, dense(heights, known), atol=2e-5)
+    np.testing.assert_allclose(found, neighbours_mean(heights, known), atol=2e-5)
     np.testing.assert_array_equal(found[known], heights[known])
     again = completed(heights, known, 1e-6, rng.normal(0.0, 3.0, shape))
     np.testing.assert_allclose(again, found, atol=4e-5)
     assert found.min() >= heights[known].min() - 1e-5 and found.max() <= heights[known].max() + 1e-5
-
-
-def test_the_paper_s_samples_a_sine_with_random_gaps_and_a_step_of_which_half_is_unknown():
-    """Fig. 7; no figures are given with it: gaps between samples close, and the unknown half is level."""
-    x, y = np.meshgrid(np.arange(60) / 59, np.arange(50) / 49, indexing="ij")
-    sine = np.sin(2 * math.pi * x) * np.cos(2 * math.pi * y)
-    known = np.random.default_rng(1).random(sine.shape) < 0.5
-    error = np.abs(completed(sine, known) - sine)
-    assert error.max() < 0.2 and error[~known].mean() < 0.01
-    step = np.where(x < 0.25, 1.0, 0.0)
-    half = x < 0.5
-    np.testing.assert_allclose(completed(step, half), step, atol=1e-3)
 
 
 def test_a_wide_gap_is_bridged_in_a_straight_line():
