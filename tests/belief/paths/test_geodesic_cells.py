@@ -176,15 +176,19 @@ def path_cost(rates, path, length_cost, by_length):
     return total
 
 
-@pytest.mark.parametrize(("length_cost", "by_length"), [(0.0, True), (0.7, False), (0.7, True)])
-def test_a_path_is_the_one_that_the_costs_of_its_cell_come_from(length_cost, by_length):
-    rates, rng = drawn_rates((7, 11, 5), 4, 0.3)
-    sources = rng.choice(np.flatnonzero(np.isfinite(rates)), 3, replace=False)
+@drawn(30)
+@given(st.sampled_from(SHAPES), seeds, st.sampled_from([0.0, 0.01, 0.7]), st.booleans())
+def test_a_path_is_the_one_that_the_costs_of_its_cell_come_from(size, seed, length_cost, by_length):
+    rates, rng = drawn_rates(size, seed, 0.3)
+    sources = rng.integers(0, rates.size, 3)
     space = new_tessellation(rates.shape)
     tessellate(space, rates, sources, length_cost, by_length)
     costs, cells = space.costs.reshape(-1), space.cells.reshape(-1)
-    for voxel in rng.choice(np.flatnonzero(np.isfinite(costs)), 12):
-        path = extract_path(space, rates, int(voxel), length_cost, by_length)
+    for voxel in range(0, rates.size, 3):
+        path = extract_path(space, rates, voxel, length_cost, by_length)
+        if cells[voxel] == UNREACHED:
+            assert len(path) == 0
+            continue
         assert path[0] == sources[cells[voxel]] and path[-1] == voxel
         assert (cells[path] == cells[voxel]).all()
         assert path_cost(rates, path, length_cost, by_length) == pytest.approx(costs[voxel], rel=1e-9)

@@ -1,4 +1,4 @@
-"""Steps in a cell, paths and the coverage functional against naive ones, and by hand."""
+"""Steps in a cell and the coverage functional against naive ones, and by hand."""
 
 from __future__ import annotations
 
@@ -11,11 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from baselines.papers.bhattacharya.simulation.covering import CellFunctional, coverage_functional, neighbours
-from entropy_explore_env.belief.paths.geodesic_cells import (
-    UNREACHED,
-    extract_path,
-    new_tessellation,
-)
+from entropy_explore_env.belief.paths.geodesic_cells import new_tessellation
 from tests.baselines.strategies.test_territory import scene
 from tests.reference.scenes import SHAPES, drawn, seeds
 
@@ -29,28 +25,6 @@ def test_the_functional_is_the_sum_over_the_cell(size, seed, by_length):
         functional, count = coverage_functional(space.cells, space.costs, density, number)
         assert count == np.count_nonzero(own)
         assert functional == pytest.approx((space.costs[own] ** 2 * density[own]).sum())
-
-
-@given(st.sampled_from(SHAPES), seeds, st.booleans())
-@drawn(30)
-def test_paths_stay_in_the_cell_and_cost_what_the_tessellation_says(size, seed, by_length):
-    rates, _, sources, space = scene(size, seed, by_length)
-    for voxel in range(0, rates.size, 3):
-        path = extract_path(space, rates, voxel, 0.01, by_length)
-        cell = space.cells.reshape(-1)[voxel]
-        if cell == UNREACHED:
-            assert len(path) == 0
-            continue
-        assert path[0] == sources[cell] and path[-1] == voxel
-        assert (space.cells.reshape(-1)[path] == cell).all()
-        cost = 0.0
-        for here, there in itertools.pairwise(path.tolist()):
-            assert there in neighbours(np.isfinite(rates), here)
-            axes = np.abs(np.subtract(np.unravel_index(here, size), np.unravel_index(there, size))).sum()
-            length, flat = math.sqrt(axes), rates.reshape(-1)
-            mean = 0.5 * (float(flat[here]) + float(flat[there]))
-            cost += mean * (length if by_length else 1.0) + 0.01 * length
-        assert cost == pytest.approx(float(space.costs.reshape(-1)[voxel]), rel=1e-6)
 
 
 @given(st.sampled_from(SHAPES), seeds)
