@@ -4,9 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
 from scipy.stats import truncnorm
 
 from entropy_explore_env.belief.entropy import LN2, fill_occupancy_entropy
+from tests.reference.scenes import drawn, random_belief, seeds
 
 
 def entropies(mean, precision):
@@ -15,13 +17,16 @@ def entropies(mean, precision):
     return filled
 
 
-def test_voxels_between_free_and_occupied_have_the_entropy_of_their_probability():
-    mean, precision = [0.1, 0.4, 0.55, 0.9, 1.0], [2.0, 100.0, 25.0, 0.01, 30.0]
+@drawn(20)
+@given(seeds)
+def test_voxels_have_the_entropy_of_the_probability_that_they_are_occupied(seed):
+    mean, precision = (values.reshape(-1) for values in random_belief((3, 4, 2), seed))
     expected = []
-    for mu, sigma in zip(np.float32(mean), np.float32(precision) ** -0.5, strict=True):
+    for mu, sigma in zip(mean.astype(float), precision.astype(float) ** -0.5, strict=True):
         p = truncnorm.sf(0.5, -mu / sigma, (1.0 - mu) / sigma, mu, sigma)
+        p = min(max(float(p), 1e-300), 1.0 - 1e-16)
         expected.append(-p * math.log(p) - (1.0 - p) * math.log(1.0 - p))
-    assert entropies(mean, precision) == pytest.approx(expected, rel=1e-3)
+    assert entropies(mean, precision) == pytest.approx(expected, rel=1e-3, abs=2e-6)
 
 
 def test_a_half_says_nothing_and_six_deviations_all():

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
-from hypothesis import given
-from scipy import stats
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies import make_strategy
 from baselines.strategies.rules.voronoi import VoronoiCoverage
 from baselines.strategies.territory import deviation_entropy, filtered, inflate_obstacles
-from entropy_explore_env.belief.entropy import LN2, fill_occupancy_entropy
+from entropy_explore_env.belief.entropy import LN2
 from entropy_explore_env.belief.paths.lattice import new_lattice
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
@@ -21,7 +17,7 @@ from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import BOX, find_scenario
-from tests.reference.scenes import build_known, drawn, free_box, random_belief, seeds, started
+from tests.reference.scenes import build_known, free_box, started
 
 NAMES = ("voronoi", "voronoi-nearest")
 
@@ -32,25 +28,7 @@ def figures_of(name, scenario=BOX, seed=0, **settings):
     return mission_figures(env.missions, 0)
 
 
-@given(seeds)
-@drawn(20)
-def test_occupancy_is_that_of_a_truncated_normal(seed):
-    mean, precision = random_belief((3, 4, 2), seed)
-    entropy = np.empty(24, np.float32)
-    fill_occupancy_entropy(mean.reshape(-1), precision.reshape(-1), entropy)
-    for voxel in range(24):
-        mu, sigma = float(mean.reshape(-1)[voxel]), float(precision.reshape(-1)[voxel]) ** -0.5
-        cut = stats.truncnorm(-mu / sigma, (1.0 - mu) / sigma, mu, sigma)
-        p = min(max(float(cut.sf(0.5)), 1e-300), 1.0 - 1e-16)
-        assert entropy[voxel] == pytest.approx(-p * math.log(p) - (1 - p) * math.log(1 - p), abs=2e-6)
-
-
 def test_entropies_by_hand():
-    out = np.empty(4, np.float32)
-    fill_occupancy_entropy(
-        np.array([0.5, 0.5, 0.0, 1.0], np.float32), np.array([1e-3, 1e3, 1e3, 1e3], np.float32), out
-    )
-    np.testing.assert_allclose(out, [LN2, LN2, 0.0, 0.0], atol=1e-7)
     falling = deviation_entropy(np.array([1e-2, 1.0, 1e2, 1e4], np.float32), 1e-2, 1e2)
     np.testing.assert_allclose(falling, [LN2, LN2 / 2, 0.0, 0.0], atol=1e-7)
     field = np.full((4, 5, 1), LN2, np.float32)
