@@ -23,20 +23,6 @@ def test_the_gradient_is_that_of_equation_30(size, seed, voxel_size_m):
         assert list(ours) == pytest.approx(expected, rel=1e-5, abs=1e-5)
 
 
-@drawn(20)
-@given(st.sampled_from(SHAPES), seeds)
-def test_the_gradient_adds_up_to_the_difference_of_entropies_and_is_nought_at_the_first_voxels(size, seed):
-    _, precision = random_belief(size, seed)
-    voxel_size_m = 0.3
-    field = np.array([entropy_gradient(precision, *voxel, voxel_size_m) for voxel in np.ndindex(*size)])
-    field = field.reshape(*size, 3)
-    entropy = np.array([rocha04.entropy_bits(p**-0.5) for p in precision.astype(float).ravel()]).reshape(size)
-    for axis in range(3):
-        along, bits = np.moveaxis(field[..., axis], axis, 0), np.moveaxis(entropy, axis, 0)
-        assert (along[0] == 0.0).all()
-        np.testing.assert_allclose(along.sum(axis=0) * voxel_size_m, bits[-1] - bits[0], atol=1e-4)
-
-
 def test_the_gradient_of_stripes():
     """σ = 2^(x - 2y + 3z), half a metre a voxel: 2, -4 and 6 bits a metre."""
     x, y, z = np.ogrid[0:7, 0:11, 0:5]

@@ -75,9 +75,8 @@ def test_a_range_is_that_of_the_ray_and_says_what_it_met(ray, seed, share, lengt
     size, start, direction = ray
     cover = random_cover(size, share, seed)
     line = Line(tuple(start.tolist()), tuple(direction.tolist()), length)
-    whole = cast_ray(cover.ravel(), size, line, STOP_AT_COVERED, False, 1, ray_space(size, length, 1))
     crossing = ray_space(size, length, 1)
-    cast_ray(cover.ravel(), size, line, STOP_AT_COVERED, False, 1, crossing)
+    whole = cast_ray(cover.ravel(), size, line, STOP_AT_COVERED, False, 1, crossing)
     at, covered, reason = cast_range(cover.ravel(), size, line, STOP_AT_COVERED)
     assert (at, reason) == (whole.length, whole.reason)
     met = cover.ravel()[crossing.voxels[whole.voxels - 1]] if reason == OBSTACLE else 0.0
