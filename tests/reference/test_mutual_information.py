@@ -28,7 +28,7 @@ OUR_BALL = np.zeros((1, 3), np.int64)
 """A body that touches only the voxel it is in."""
 
 
-def ours(belief, position, radius, cone, mates, weights, planar, ranked=None):
+def ours(belief, position, radius, cone, mates, weights, planar):
     """Candidates, and which is the best."""
     mean, precision = belief
     layer = int(position[2]) if planar else None
@@ -49,7 +49,7 @@ def ours(belief, position, radius, cone, mates, weights, planar, ranked=None):
     factors = Factors(weights.kappa, weights.scale_bits, known)
     most = candidates["steepness"] / candidates["steepness"].max()
     most = most - weights.kappa * candidates["distance"] / radius
-    order = np.argsort(-most, kind="stable") if ranked is None else ranked(most)
+    order = np.argsort(-most, kind="stable")
     own = _cone((0.0, 0.0, 0.0), 0.0, 0.0, *cone)
     best = best_candidate(
         candidates,
@@ -105,32 +105,3 @@ def test_the_choice_is_the_best_of_equation_13(seed, planar, teammates, kappa):
     slope = rochami.bounded_gradient(beliefs, voxel, 0.05, planar)
     gaze = np.array(rochami.rocha04.gaze(chosen["yaw"], chosen["pitch"]))
     assert gaze * math.hypot(*slope) == pytest.approx(slope, abs=1e-5)  # eq. 11
-
-
-def test_which_is_looked_at_first_does_not_matter():
-    """Candidates in any order that begins with what could be worth most give one value."""
-    belief = random_belief(SIZE, 5)
-    belief[0][:] *= 0.5
-    weights = rochami.Weights(0.1, 30.0, 0.5, 0.05, 0.5)
-    mate = rochami.Mate((5.5, 8.5, 2.5), (5.5, 8.5, 2.5), rochami.Cone((5.5, 8.5, 2.5), -2.0, 0.0, 6.0, 0.7))
-    args = (belief, (2.4, 5.6, 2.5), 3.0, (4.0, 0.5), [mate], weights, True)
-    first = ours(*args)
-    flipped = ours(
-        *args, ranked=lambda most: np.argsort(-most[::-1], kind="stable")[::1] * -1 + len(most) - 1
-    )
-    assert first[1] == flipped[1] >= 0
-
-
-def test_an_overlap_with_unknown_space_repels_and_one_with_known_space_does_not():
-    """Two frontiers, equally steep, one ahead of a teammate that looks at it."""
-    mean, precision = np.full(SIZE, 0.1, np.float32), np.full(SIZE, 400.0, np.float32)
-    precision[:, 9:] = precision[:, :2] = 1e-2
-    sees = rochami.Cone((3.5, 5.5, 2.5), math.pi / 2, 0.0, 6.0, 0.8)
-    far = (-50.0, -50.0, 2.5)
-    weights = rochami.Weights(0.0, 5.0, INTERFERENCE, 0.05, 0.0)
-    for yaw, side in ((math.pi / 2, 1), (-math.pi / 2, 9)):
-        mate = rochami.Mate(far, far, sees._replace(yaw=yaw))
-        candidates, best = ours(
-            (mean, precision), (3.5, 5.5, 2.5), 6.0, (3.0, 0.5), [mate], weights, planar=True
-        )
-        assert abs(int(candidates[best]["place"][1]) - side) <= 1
