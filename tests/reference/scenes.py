@@ -6,6 +6,7 @@ No two edges of a world are equal, so that swapped axes show.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 from typing import Any
 
@@ -50,6 +51,20 @@ def rays(draw: st.DrawFn) -> tuple[rocha04.Voxel, np.ndarray, np.ndarray]:
 def flat_index(voxels: Any, size: rocha04.Voxel) -> list[int]:
     """Numbers of voxels in C order, z fastest."""
     return [(x * size[1] + y) * size[2] + z for x, y, z in voxels]
+
+
+def flood(room: np.ndarray, start: tuple[int, ...]) -> set[tuple[int, ...]]:
+    """What hangs together with a voxel by faces: a search breadth first."""
+    reached, queue = {start}, deque([start])
+    while queue:
+        here = queue.popleft()
+        for axis in range(room.ndim):
+            for step in (-1, 1):
+                near = (*here[:axis], here[axis] + step, *here[axis + 1 :])
+                if 0 <= near[axis] < room.shape[axis] and room[near] and near not in reached:
+                    reached.add(near)
+                    queue.append(near)
+    return reached
 
 
 def random_cover(size: rocha04.Voxel, share: float, seed: int) -> np.ndarray:

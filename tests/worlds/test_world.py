@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import pickle
-from collections import deque
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.worlds.world import Collision, World, no_fly_mask
-from tests.reference.scenes import drawn, free_box, random_cover, seeds
+from tests.reference.scenes import drawn, flood, free_box, random_cover, seeds
 
 SIZE = (7, 11, 5)
 STEPS = [(1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)]
@@ -26,24 +25,10 @@ def world_of(occupied, voxel_size_m=0.5):
     return World(Grid(occupied.shape, voxel_size_m), occupied, "by hand")
 
 
-def part_of(room, voxel):
-    """Voxels of `room` that hang together with one of them by faces: a search breadth first."""
-    part, queue = {voxel}, deque([voxel])
-    while queue:
-        x, y, z = queue.popleft()
-        for dx, dy, dz in STEPS:
-            near = (x + dx, y + dy, z + dz)
-            inside = all(0 <= n < size for n, size in zip(near, room.shape, strict=True))
-            if inside and room[near] and near not in part:
-                part.add(near)
-                queue.append(near)
-    return part
-
-
 def parts_of(room):
     left, parts = {tuple(voxel) for voxel in np.argwhere(room).tolist()}, []
     while left:
-        parts.append(part_of(room, min(left)))
+        parts.append(flood(room, min(left)))
         left -= parts[-1]
     return parts
 

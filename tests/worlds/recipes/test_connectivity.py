@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,21 +10,7 @@ from hypothesis import strategies as st
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.worlds.components import largest_component
 from entropy_explore_env.worlds.recipes.connectivity import body_room, cut_gates, fill_pockets
-from tests.reference.scenes import drawn, random_cover, seeds
-
-
-def flood(room, start):
-    """What hangs together with a voxel by faces: a search breadth first."""
-    reached, queue = {start}, deque([start])
-    while queue:
-        here = queue.popleft()
-        for axis in range(room.ndim):
-            for step in (-1, 1):
-                near = (*here[:axis], here[axis] + step, *here[axis + 1 :])
-                if 0 <= near[axis] < room.shape[axis] and room[near] and near not in reached:
-                    reached.add(near)
-                    queue.append(near)
-    return reached
+from tests.reference.scenes import drawn, flood, random_cover, seeds
 
 
 @drawn(40)

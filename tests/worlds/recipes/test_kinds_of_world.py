@@ -23,11 +23,7 @@ from entropy_explore_env.worlds.recipes.corridor import corridor
 from entropy_explore_env.worlds.recipes.hybrid import hybrid
 from entropy_explore_env.worlds.recipes.obstacles import cluttered, occlusions
 from entropy_explore_env.worlds.recipes.rooms import lab
-
-
-def distances(free):
-    """To the nearest voxel that is not free, between centres, in voxels."""
-    return np.asarray(ndimage.distance_transform_edt(free))
+from tests.worlds.recipes.test_obstacles import distances
 
 
 def rng(seed):
