@@ -20,7 +20,7 @@ from entropy_explore_env.worlds.given import (
     in_given_worlds,
     with_given_worlds,
 )
-from entropy_explore_env.worlds.load import load_world, save_world, world_bytes, world_from_bytes
+from entropy_explore_env.worlds.load import load_world, save_world
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import free_box, wander
@@ -170,16 +170,6 @@ def test_missions_check_the_worlds_that_they_are_given():
         in_given_worlds(free_box(), [WORLDS[0], walled(2, grid=Grid(SHAPE, 0.5))])
     with pytest.raises(SettingError, match="or a World"):
         Missions(in_given_worlds(free_box(), WORLDS))  # its worlds are not there any more
-
-
-def test_a_world_as_bytes_comes_back_whole():
-    ceiling = np.full(SHAPE[:2], 4, np.int32)
-    ceiling[0, 0] = 7
-    world = World(GRID, WORLDS[0].occupied.copy(), "σ and more", ceiling, 0.25)
-    back = world_from_bytes(world_bytes(world))
-    assert (back.grid, back.name, back.yaw_rad) == (world.grid, world.name, world.yaw_rad)
-    np.testing.assert_array_equal(back.occupied, world.occupied)
-    np.testing.assert_array_equal(back.ceiling, ceiling)
 
 
 def test_paths_of_the_same_file_are_read_once(tmp_path, monkeypatch):

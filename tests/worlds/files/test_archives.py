@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from benchmarks.proofs.world_samples import npz, saved_world
 from entropy_explore_env.errors import WorldError
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.worlds.load import load_world, save_world
+from entropy_explore_env.worlds.load import load_world, save_world, world_from_bytes
 from entropy_explore_env.worlds.world import World
 from tests.reference.scenes import SHAPES, drawn, random_cover, seeds
 
@@ -42,12 +42,12 @@ def test_a_saved_world_comes_back_without_loss(
     world = World(Grid(shape, edge, origin), occupied, name, ceiling, yaw)
     path = tmp_path_factory.mktemp("worlds") / "any.npz"
     save_world(world, path)
-    same = load_world(path)
-    assert (same.grid, same.name, same.yaw_rad) == (world.grid, name, yaw)
-    np.testing.assert_array_equal(same.occupied, occupied)
-    assert (same.ceiling is None) == (ceiling is None)
-    if ceiling is not None:
-        np.testing.assert_array_equal(same.ceiling, ceiling)
+    for same in (load_world(path), world_from_bytes(path.read_bytes())):
+        assert (same.grid, same.name, same.yaw_rad) == (world.grid, name, yaw)
+        np.testing.assert_array_equal(same.occupied, occupied)
+        assert (same.ceiling is None) == (ceiling is None)
+        if ceiling is not None:
+            np.testing.assert_array_equal(same.ceiling, ceiling)
 
 
 def test_a_ceiling_is_resampled_to_the_lowest_whole_voxel(tmp_path):

@@ -53,10 +53,6 @@ def test_grey_walls_are_told_and_a_limit_makes_them_solid(tmp_path):
     assert np.unique(np.nonzero(world.occupied)[0]).tolist() == [3]
     some = load(tmp_path, image(shades), free_above=200)
     assert some.unknown is not None and (some.unknown == world.occupied).all()
-    with pytest.warns(WorldWarning, match="cropped from 2000 × 600"):
-        large = np.full((600, 2000), 150, np.uint8)
-        large[100:110, 40:60] = 255
-        assert load(tmp_path, image(large), occupied_below=200).grid.origin_m == (39 * 0.05, 489 * 0.05, 0.0)
 
 
 @pytest.mark.parametrize("kind", ["PNG", "PPM", "JPEG", "BMP", "GIF"])
