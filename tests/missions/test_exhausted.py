@@ -26,6 +26,14 @@ def rooms(**settings):
     return missions
 
 
+def all_seen(**settings):
+    """Robots that together know the rooms, and are asked for more than scans can show: they are idle."""
+    missions = rooms(channel={"burst": 0}, **settings)
+    missions.state.joint_precision[0][:] = 1e4
+    missions.state.missions[0]["explored_visible"], missions.state.missions[0]["explored_end"] = 1000, 2000
+    return missions
+
+
 def idle(missions, scans=IDLE_SCANS, rounds=IDLE_ROUNDS):
     """Let the team have been idle for so long that its next step, a turn on the spot, asks what is left."""
     clock, robots = missions.state.missions[0], missions.state.robots[0]
@@ -60,10 +68,7 @@ def leave(missions):
     ],
 )
 def test_the_team_has_seen_what_is_near_and_has_long_been_idle(left, scans, rounds, end):
-    missions = rooms(channel={"burst": 0})
-    missions.state.missions[0]["explored_visible"] = 1000  # more than scans can show: they are idle
-    missions.state.missions[0]["explored_end"] = 2000
-    missions.state.joint_precision[0][:] = 1e4
+    missions = all_seen()
     if left:
         leave(missions)
     idle(missions, scans, rounds)
@@ -75,9 +80,7 @@ def test_the_team_has_seen_what_is_near_and_has_long_been_idle(left, scans, roun
 def test_where_maps_are_shared_robots_that_work_have_to_know(stops, end):
     faults = {"faults": {"stop": {"at_s": 0.2, "robots": (1,)}}} if stops else {}
     ending = {"seen_share": 1.0, "termination": "shared"}
-    missions = rooms(channel={"burst": 0}, ending=ending, **faults)
-    missions.state.joint_precision[0][:] = 1e4
-    missions.state.missions[0]["explored_visible"], missions.state.missions[0]["explored_end"] = 1000, 2000
+    missions = all_seen(ending=ending, **faults)
     know(missions, 0)
     for _ in range(2):
         idle(missions)
@@ -85,8 +88,7 @@ def test_where_maps_are_shared_robots_that_work_have_to_know(stops, end):
 
 
 def test_a_team_that_has_seen_enough_goes_on_to_share_it():
-    missions = rooms(ending={"seen_share": 1.0, "termination": "shared"}, channel={"burst": 0})
-    missions.state.joint_precision[0][:] = 1e4
+    missions = all_seen(ending={"seen_share": 1.0, "termination": "shared"})
     clock = missions.state.missions[0]
     clock["explored_visible"] = clock["explored_end"] = clock["visible"]
     for robot in (0, 1):
@@ -96,10 +98,7 @@ def test_a_team_that_has_seen_enough_goes_on_to_share_it():
 
 
 def test_a_team_that_has_something_left_is_asked_again_soon():
-    missions, stay = rooms(channel={"burst": 0}), (np.zeros((1, 2, 5)), np.zeros((1, 2), np.int64))
-    missions.state.joint_precision[0][:] = 1e4
-    clock = missions.state.missions[0]
-    clock["explored_visible"], clock["explored_end"] = 1000, 2000
+    missions, stay = all_seen(), (np.zeros((1, 2, 5)), np.zeros((1, 2), np.int64))
     leave(missions)
     idle(missions)
     assert missions.over(0) is MissionEnd.RUNNING
