@@ -24,6 +24,7 @@ from baselines.experiments.worker_pool import Failure, run_each
 from entropy_explore_env.errors import MissingExtraError, SettingError
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import BOX
+from tests.systems import processes_with
 
 ray = pytest.importorskip("ray", reason="ray is not installed: pip install 'entropy_explore_env[cluster]'")
 
@@ -113,19 +114,6 @@ SHORT = with_settings(BOX, {"time_limit_s": 60.0})
 CELLS = (Cell("walk", SHORT, "random", 24), Cell("steep", SHORT, "gradient", 16))
 
 
-def mission_workers() -> list[int]:
-    """Processes of this cluster in which workers run missions now."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            ours = MARK.encode() in path.with_name("environ").read_bytes()
-            if ours and path.read_bytes().startswith(b"ray::trial"):
-                found.append(int(path.parent.name))
-        except OSError:
-            pass
-    return found
-
-
 @pytest.mark.skipif(not Path("/proc/self/cmdline").exists(), reason="looks processes up in /proc")
 def test_a_sweep_whose_workers_are_killed_leaves_the_same_bytes(two_workers, tmp_path, capsys):
     """As one of this machine does; progress is shown as always, and a resumed one runs what is missing."""
@@ -133,7 +121,7 @@ def test_a_sweep_whose_workers_are_killed_leaves_the_same_bytes(two_workers, tmp
 
     def kill() -> None:
         while not done.wait(rng.uniform(0.05, 0.25)) and len(kills) < 6:
-            if workers := mission_workers():
+            if workers := processes_with(MARK, b"ray::trial"):
                 kills.append(rng.choice(workers))
                 os.kill(kills[-1], signal.SIGKILL)
 

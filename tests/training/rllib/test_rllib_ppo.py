@@ -20,6 +20,7 @@ from baselines.experiments import ray_cluster
 from baselines.experiments.mission import run_mission
 from baselines.strategies import make_strategy
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
+from tests.systems import processes_with
 from training.checkpoints import latest_checkpoint, load_checkpoint
 from training.rllib_ppo import Args, main, parsed
 from training.rllib_run import configure, environment_settings, read_rows
@@ -102,19 +103,6 @@ def test_a_runner_that_is_killed_is_replaced(tmp_path):
     assert run.returncode == 0, rest
     rows = rows_of(tmp_path / "run")
     assert 1900 <= float(rows[-1]["decisions"]) < 2200 and "RunnerDied" not in rest
-
-
-def processes_with(mark: str, title: bytes) -> list[int]:
-    """Processes with this in their environment, whose titles begin so."""
-    found = []
-    for path in Path("/proc").glob("[0-9]*/cmdline"):
-        try:
-            ours = mark.encode() in path.with_name("environ").read_bytes()
-            if ours and path.read_bytes().startswith(title):
-                found.append(int(path.parent.name))
-        except OSError:
-            pass
-    return found
 
 
 def missions_of(args: Args, iterations: int) -> list[tuple[int, bytes]]:
