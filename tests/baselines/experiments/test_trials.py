@@ -22,10 +22,12 @@ from baselines.experiments.trials import (
     How,
     by_cell,
     described,
+    failed_record,
     run_cells,
     run_trials,
     trials_of,
 )
+from baselines.experiments.worker_pool import Failure
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import BOX, OFFICE
@@ -139,7 +141,7 @@ def test_failures_are_raised_or_kept_and_a_longer_limit_runs_late_ones_again(tmp
     assert len(read_table(table)) == 1
     (row,) = run_trials([failing], table, How(keep_failures=True))
     assert row.record["failed"] == "ValueError: nothing" and "in run" in row.record["trace"]
-    late = {"failed": "ran past 1 s", "trace": "", "limit_s": 1.0}
+    late = failed_record(Failure("ran past 1 s", late=True), 1.0)
     known = [dataclasses.replace(row, cell="square", seed=5, settings={"factor": 1}, record=late)]
     assert run_trials([Square(5)], table, How(limit_s=0.5), known)[0].record == late
     assert run_trials([Square(5)], table, How(limit_s=2.0))[0].record == {"square": 25}
