@@ -11,54 +11,42 @@ from entropy_explore_env.worlds.files.map_server import labelling
 from entropy_explore_env.worlds.load import load_world
 from tests.systems import needs_posix
 
-UNKNOWN, FREE, SOLID = -1, 0, 1
-
 
 def labels(shades, mode, negate=False, free=0.196, occupied=0.65, **more):
     return labelling(mode, negate, free, occupied, **more)(np.array(shades, np.float64)).tolist()
 
 
-def test_trinary_by_hand():
-    """p = (255 - x)/255: 89 → 0.651, 90 → 0.647, 205 → 0.1961, 206 → 0.192."""
-    assert labels([0, 89, 90, 205, 206, 255], "trinary") == [SOLID, SOLID, UNKNOWN, UNKNOWN, FREE, FREE]
+LIMITS = {"free": 0.4, "occupied": 0.6}
+SHADES = {"given": (150.0, 205.0)}
 
 
-def test_thresholds_count_unless_the_old_rule_is_asked_for():
-    """p = 0.4 at 153 and 0.6 at 102: thresholds themselves."""
-    at, between = [255, 153, 102, 0], [154, 152, 103, 101]
-    assert labels(at, "trinary", free=0.4, occupied=0.6) == [FREE, FREE, SOLID, SOLID]
-    assert labels(at, "trinary", free=0.4, occupied=0.6, strict=True) == [FREE, UNKNOWN, UNKNOWN, SOLID]
-    for strict in (False, True):
-        found = labels(between, "trinary", free=0.4, occupied=0.6, strict=strict)
-        assert found == [FREE, UNKNOWN, UNKNOWN, SOLID]
-    assert labels([0, 255], "trinary", free=0.0, occupied=1.0) == [SOLID, FREE]
-
-
-def test_shades_that_are_given_stand_in_for_thresholds():
-    given = labels([0, 149, 150, 205, 206], "trinary", given=(150.0, 205.0))
-    assert given == [SOLID, SOLID, UNKNOWN, UNKNOWN, FREE]
-    inverted = labels([255, 106, 105, 50, 49], "trinary", negate=True, given=(150.0, 205.0))
-    assert inverted == given
-
-
-def test_negate_by_hand():
-    """p = x/255: 49 → 0.192, 50 → 0.1961, 165 → 0.647, 166 → 0.651."""
-    found = labels([0, 49, 50, 165, 166, 255], "trinary", negate=True)
-    assert found == [FREE, FREE, UNKNOWN, UNKNOWN, SOLID, SOLID]
-
-
-def test_scale_by_hand():
-    """Thresholds 0.2 and 0.6: 1 + 98 (p - 0.2)/0.4 is 49.0 for x = 154 and 51.0 for x = 152."""
-    found = labels([255, 210, 154, 152, 110, 0], "scale", free=0.2, occupied=0.6)
-    assert found == [FREE, FREE, FREE, SOLID, SOLID, SOLID]
-    assert labels([205], "scale") == [UNKNOWN]
-    assert labels([205], "scale", strict=True) == [FREE]
-
-
-def test_raw_by_hand():
-    for negate in (False, True):
-        found = labels([0, 49, 50, 100, 101, 255], "raw", negate=negate)
-        assert found == [FREE, FREE, SOLID, SOLID, UNKNOWN, UNKNOWN]
+@pytest.mark.parametrize(
+    ("shades", "expected", "mode", "more"),
+    [
+        # p = (255 - x)/255: 89 → 0.651, 90 → 0.647, 205 → 0.1961, 206 → 0.192.
+        ([0, 89, 90, 205, 206, 255], "##??..", "trinary", {}),
+        # p = x/255: 49 → 0.192, 50 → 0.1961, 165 → 0.647, 166 → 0.651.
+        ([0, 49, 50, 165, 166, 255], "..??##", "trinary", {"negate": True}),
+        # p = 0.4 at 153 and 0.6 at 102: thresholds themselves count, unless the old rule is asked for.
+        ([255, 153, 102, 0], "..##", "trinary", LIMITS),
+        ([255, 153, 102, 0], ".??#", "trinary", {**LIMITS, "strict": True}),
+        ([154, 152, 103, 101], ".??#", "trinary", LIMITS),
+        ([154, 152, 103, 101], ".??#", "trinary", {**LIMITS, "strict": True}),
+        ([0, 255], "#.", "trinary", {"free": 0.0, "occupied": 1.0}),
+        # Shades that are given stand in for thresholds.
+        ([0, 149, 150, 205, 206], "##??.", "trinary", SHADES),
+        ([255, 106, 105, 50, 49], "##??.", "trinary", {**SHADES, "negate": True}),
+        # Thresholds 0.2 and 0.6: 1 + 98 (p - 0.2)/0.4 is 49.0 for x = 154 and 51.0 for x = 152.
+        ([255, 210, 154, 152, 110, 0], "...###", "scale", {"free": 0.2, "occupied": 0.6}),
+        ([205], "?", "scale", {}),
+        ([205], ".", "scale", {"strict": True}),
+        ([0, 49, 50, 100, 101, 255], "..##??", "raw", {}),
+        ([0, 49, 50, 100, 101, 255], "..##??", "raw", {"negate": True}),
+    ],
+)
+def test_shades_are_labelled_by_hand(shades, expected, mode, more):
+    """Free, solid and unknown are . # and ?"""
+    assert "".join("?.#"[label + 1] for label in labels(shades, mode, **more)) == expected
 
 
 def write(folder, yaml=YAML, image=None, name="plan.pgm"):
