@@ -17,11 +17,12 @@ from baselines.strategies.rules.receding_horizon import RecedingHorizon
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.frontiers.frontier_map import KNOWN_SIGMA
+from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.settings.scenarios import find_scenario
+from entropy_explore_env.settings.scenarios import BOX, find_scenario
 from tests.planner.scenes import small_plan, varied
 from tests.reference import explorers as reference
 from tests.reference import planners
@@ -167,6 +168,15 @@ def test_who_finds_no_frontier_drives_to_a_random_place_and_not_to_another_at_ea
 
     run_mission(env, strategy, 0, look)
     assert kept.count(True) > 2 * kept.count(False) > 20
+
+
+@pytest.mark.parametrize(
+    "name", ["mutual-information", "ground-gradient", "per-time-visibility", "voronoi", "voronoi-nearest"]
+)
+def test_missions_in_a_box_end(name):
+    env = EntropyExploreEnv(with_settings(scripted(BOX), {"time_limit_s": 2000.0}))
+    run_mission(env, make_strategy(name), 0)
+    assert env.missions.over(0) is MissionEnd.MAPPED
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -12,10 +12,9 @@ from baselines.strategies import STRATEGIES, make_strategy
 from baselines.strategies.rules.mutual_information import MutualInformation
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.settings.changes import with_settings
-from entropy_explore_env.settings.scenarios import BOX, LAB
+from entropy_explore_env.settings.scenarios import LAB
 from tests.reference.scenes import free_box, put, started
 
 PLANAR = {"motion": "planar", "sensor_height_m": 1.25, "reach_m": 2.0, "turn_rate_rad_s": math.inf}
@@ -151,13 +150,6 @@ def test_flying_robots_climb_the_gradient():
     put(missions, 0, (1.75, 2.75, 1.25, 0.0, 0.0))
     for viewpoint in chosen(missions):
         assert viewpoint[2] == pytest.approx(2.25) and viewpoint[4] == pytest.approx(-math.pi / 2)
-
-
-@pytest.mark.parametrize("name", ["mutual-information", "ground-gradient"])
-def test_they_finish_in_the_flying_box(name):
-    env = EntropyExploreEnv(scripted(with_settings(BOX, {"robots": 2})))
-    run_mission(env, make_strategy(name), 1)
-    assert env.missions.over(0) is MissionEnd.MAPPED
 
 
 def test_one_robot_is_not_coordinated_with_anybody():

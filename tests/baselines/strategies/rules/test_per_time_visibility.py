@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from baselines.experiments.mission import run_mission, scripted
+from baselines.experiments.mission import scripted
 from baselines.papers.sawhney.mission import explore_until_done
 from baselines.strategies.allocation import ExplorationConfig
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
@@ -23,13 +23,8 @@ from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
-from entropy_explore_env.settings.scenarios import BOX, find_scenario
+from entropy_explore_env.settings.scenarios import find_scenario
 
-SETTINGS = {
-    "per-time-visibility": ExplorationConfig(),
-    "the metric of Yamauchi": ExplorationConfig(metric="nearest", promises=False),
-    "the metric of Burgard": ExplorationConfig(metric="coordinated"),
-}
 PERFECT = {"burst": 10_000, "i_min_bits": 0.0}
 
 
@@ -227,14 +222,6 @@ def test_synchronous_robots_leave_together():
         if len(before) == 3:
             ended_s = max(end for _, end in before)
             assert all(left_s >= ended_s - 1e-6 for left_s, _ in after)
-
-
-@pytest.mark.parametrize("name", SETTINGS)
-def test_missions_in_a_box_end(name):
-    env = EntropyExploreEnv(with_settings(scripted(BOX), {"time_limit_s": 2000.0}))
-    run_mission(env, PerTimeVisibility(SETTINGS[name]), 0)
-    figures = mission_figures(env.missions, 0)
-    assert figures["finished"], figures["end_reason"]
 
 
 def test_bodies_and_a_short_reach_explore_an_office():

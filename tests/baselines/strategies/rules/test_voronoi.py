@@ -16,16 +16,8 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.settings.changes import with_settings
-from entropy_explore_env.settings.scenarios import BOX, find_scenario
+from entropy_explore_env.settings.scenarios import find_scenario
 from tests.reference.scenes import build_known, free_box, started
-
-NAMES = ("voronoi", "voronoi-nearest")
-
-
-def figures_of(name, scenario=BOX, seed=0, **settings):
-    env = EntropyExploreEnv(with_settings(scripted(scenario), settings))
-    run_mission(env, make_strategy(name), seed)
-    return mission_figures(env.missions, 0)
 
 
 def test_entropies_by_hand():
@@ -47,15 +39,11 @@ def test_where_a_body_does_not_fit_by_hand():
     assert not closed[2, 2] and not closed[2, 1] and not closed[1, 2]  # its start, and what it touches there
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_missions_in_a_box_end(name):
-    figures = figures_of(name, time_limit_s=600.0)
-    assert figures["finished"], figures["end_reason"]
-
-
 @pytest.mark.parametrize("name", ["voronoi", "voronoi-nearest"])
 def test_an_office_is_explored(name):
-    figures = figures_of(name, find_scenario("office"), seed=1, track_truth=True)
+    env = EntropyExploreEnv(with_settings(scripted(find_scenario("office")), {"track_truth": True}))
+    run_mission(env, make_strategy(name), 1)
+    figures = mission_figures(env.missions, 0)
     assert figures["finished"] and figures["joint"]["explored"] > 0.95
 
 
