@@ -62,21 +62,6 @@ def test_the_table_warns_of_robots_that_have_hardly_moved():
     assert of(False, (0.0, 0), scans=9) == []
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        "--json --strategy random --seed=3",
-        "--channel.no_announcements",
-    ],
-)
-def test_options_may_stand_before_the_scenario(options, command):
-    before, after = (
-        without_clock(json.loads(command(*words, "--json").out))
-        for words in ([*options.split(), "box-7x11x5"], ["box-7x11x5", *options.split()])
-    )
-    assert before == after
-
-
 def test_team_strategy_and_ending_can_be_said(figures):
     three = figures("--robots", "3", "--strategy", "random", *SHORT)
     assert three["robots"] == len(three["per_robot"]) == 3
@@ -102,9 +87,6 @@ def test_the_table_leaves_out_what_means_nothing(command):
     short, whole, single = (command("box-7x11x5", *words).out for words in (SHORT, (), alone))
     assert all(label in whole and label not in single for label in team)
     assert "scans over the floor" in whole and "scans over the floor" not in short
-
-
-# --- bad input
 
 
 # --- as a process
