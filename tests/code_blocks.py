@@ -24,6 +24,14 @@ class Block(NamedTuple):
     text: str
 
 
+PAGES = [
+    page
+    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md")))
+    if not {DOCS / "scenarios", DOCS / "build"}.intersection(page.parents)
+]
+"""All that is not made from the code."""
+
+
 def pages() -> list[Path]:
     """README.md and the pages that people write: neither results nor what is made from the code."""
     made = {DOCS / "results", DOCS / "scenarios", DOCS / "build"}

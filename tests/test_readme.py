@@ -2,19 +2,13 @@
 
 import json
 import re
-from pathlib import Path
 
 import pytest
 
 from entropy_explore_env.planner.weights import SHIPPED
+from tests.code_blocks import PAGES, ROOT
 
-ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-PAGES = [
-    path
-    for path in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *(ROOT / "docs").rglob("*.md"))
-    if not {"scenarios", "build"}.intersection(path.relative_to(ROOT).parts)
-]
 
 
 def test_it_is_one_screen_and_some_links():

@@ -17,15 +17,10 @@ import pytest
 
 from baselines.cli.options import options_of
 from entropy_explore_env.__main__ import PARTS
-from tests.code_blocks import ROOT
+from tests.code_blocks import PAGES, ROOT
 
 OUTSIDE = ("pip", "pytest", "venv", "tests")
 """Packages whose options are not checked."""
-PAGES = [
-    page
-    for page in (ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md")))
-    if not {ROOT / "docs" / "scenarios", ROOT / "docs" / "build"}.intersection(page.parents)
-]
 _TARGETS = set(re.findall(r"^([a-z][\w-]*):", (ROOT / "Makefile").read_text("utf-8"), flags=re.MULTILINE))
 _COMMAND = re.compile(r"(?:\w+=\S+ )*(?:\S*python3? -m |entropy-explore-env |make )[^`\n]*")
 _VARIABLE = re.compile(r"[A-Z_]+=")
