@@ -1,7 +1,6 @@
 """What others ask of an environment: the checkers of PettingZoo, Gymnasium and Stable-Baselines3."""
 
 import functools
-from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
@@ -74,15 +73,7 @@ def test_pettingzoo_seeds(scenario: str, robots: int, kind: str) -> None:
     seed_test(functools.partial(env, scenario, **given), num_cycles=10)
 
 
-@pytest.mark.parametrize(("scenario", "robots", "kind"), params(*TEAMS))
-def test_pettingzoo_max_cycles(scenario: str, robots: int, kind: str) -> None:
-    made = [
-        functools.partial(make, scenario, **settings(robots, kind, "default")) for make in (parallel_env, env)
-    ]
-    max_cycles_test(SimpleNamespace(parallel_env=made[0], env=made[1]))
-
-
-def test_pettingzoo_max_cycles_of_the_package() -> None:
+def test_pettingzoo_max_cycles() -> None:
     max_cycles_test(entropy_explore_env)
 
 

@@ -117,7 +117,7 @@ def test_words_that_are_nearly_right_are_answered_with_the_right_one(asked: Any,
 
 
 @pytest.mark.parametrize(
-    "seeds", [[[1], [2, 3]], np.zeros((2, 1), int), np.array(3), b"ab", [1, 2.0], {1: 2}]
+    "seeds", [[1], [[1], [2, 3]], np.zeros((2, 1), int), np.array(3), b"ab", [1, 2.0], {1: 2}]
 )
 def test_seeds_of_rows_are_whole_numbers_one_a_mission(seeds: Any) -> None:
     with pytest.raises(SettingError, match=r"seeds = .*2 whole numbers"):

@@ -137,8 +137,6 @@ def test_the_last_observation_of_a_busy_robot_is_whole() -> None:
 
 
 def test_seeds_are_one_a_mission() -> None:
-    with pytest.raises(SettingError, match="seeds"):
-        RobotVecEnv("box-7x11x5", 3, seeds=[1, 2], **SHORT)
     rows = made()
     rows.reset()
     assert rows.vector_env.missions.seeds == SEEDS

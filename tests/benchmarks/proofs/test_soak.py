@@ -26,10 +26,6 @@ class Step:
         soak.check(self.env, self.stepped, self.before, self.now)
 
 
-def test_a_sound_step_passes():
-    Step().check()
-
-
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
