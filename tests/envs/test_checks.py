@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from entropy_explore_env import ActionError, parallel_env
+from entropy_explore_env import ActionError
 from entropy_explore_env.envs.checks import ActionChecker
-from entropy_explore_env.envs.conformance import require_same, snapshot
 
 BOX = ActionChecker(spaces.Box(-1.0, 1.0, (5,), np.float32))
 DISCRETE = ActionChecker(spaces.Discrete(7))
@@ -87,29 +86,6 @@ def test_what_is_no_action_is_refused(checker: ActionChecker, action: Any, said:
     with pytest.raises(ActionError, match=said) as caught:
         checker.one("robot_0", action)
     assert caught.value.field == "actions[robot_0]"
-
-
-@pytest.mark.parametrize(
-    "actions",
-    [
-        None,
-        {},
-        [],
-        {"robot_0": np.zeros(5)},
-        {"robot_0": np.zeros(5), "robot_2": np.zeros(5)},
-        {f"robot_{n}": np.zeros(5) for n in range(3)},
-        {0: np.zeros(5), 1: np.zeros(5)},
-        [np.zeros(5)] * 2,
-        np.zeros((2, 5)),
-    ],
-)
-def test_actions_for_others_than_the_team_are_refused_and_change_nothing(actions: Any) -> None:
-    env = parallel_env("box-7x11x5", robots=2)
-    env.reset(seed=0)
-    before = snapshot(env)
-    with pytest.raises(ActionError, match="actions = "):
-        env.step(actions)
-    require_same("bad actions", before, snapshot(env))
 
 
 def test_tables_are_checked_as_a_whole() -> None:

@@ -1,4 +1,4 @@
-"""One step by hand: driving, messages on their way, bodies in the way, actions that are ignored."""
+"""One step by hand: driving, messages on their way, bodies in the way."""
 
 import math
 
@@ -14,7 +14,7 @@ from entropy_explore_env.robots.range_sensor import Return
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World
 from tests.reference import rocha04
-from tests.reference.scenes import build, free_box, put, random_actions, standing, started, toward, wander
+from tests.reference.scenes import build, free_box, put, standing, started, toward, wander
 
 ONE_RAY = {"field_of_view_rad": (0.0, 0.0)}
 
@@ -139,23 +139,6 @@ def test_a_teammate_between_a_robot_and_the_wall_leaves_no_measurement():
     assert robots["received_bits"][0] == robots["own_bits"][1] > 0.0
     known = np.flatnonzero(missions.state.precision[0, 0] != missions.state.precision[0, 0].min())
     assert known.tolist() == [(3 * 11 + y) * 5 + 2 for y in range(7, 11)]
-
-
-def test_actions_of_busy_robots_are_ignored():
-    """Two teams with the same choices while deciding, and other ones while driving: the same to the bit."""
-    teams = [started(free_box(robots=3, world="furnished"), seed=9) for _ in range(2)]
-    rng, other = np.random.default_rng(0), np.random.default_rng(1)
-    ignored = 0
-    for _ in range(30):
-        boxes, numbers = random_actions(teams[0], rng)
-        wild, _ = random_actions(teams[0], other)
-        busy = ~teams[0].state.robots["deciding"]
-        ignored += busy.sum()
-        teams[0].step(boxes, numbers)
-        teams[1].step(np.where(busy[..., None], wild, boxes), numbers)
-        for one, two in zip(teams[0].state, teams[1].state, strict=True):
-            assert one.tobytes() == two.tobytes()
-    assert ignored > 10
 
 
 def test_a_step_of_no_fixed_length_ends_with_the_next_arrival():
