@@ -16,8 +16,11 @@ PRIOR = 1.0 / 900.0
 KNOWN, UNKNOWN = 100.0, PRIOR
 
 
-def graph_of(rates, layer=None):
-    """Steps between neighbours, (V, V) sparse: none past a corner that is impassable."""
+def graph_of(rates, layer=None, length_cost=0.0, by_length=True):
+    """Steps between neighbours, (V, V) sparse: none past a corner that is impassable.
+
+    A step costs the mean rate of its ends, times its length unless that does not count, and its length.
+    """
     shape, edges = rates.shape, {}
     for voxel in np.ndindex(*shape):
         for step in itertools.product((-1, 0, 1), repeat=3):
@@ -29,8 +32,9 @@ def graph_of(rates, layer=None):
             passed = itertools.product(*({0, axis} for axis in step))
             if all(math.isfinite(rates[tuple(np.add(voxel, part).tolist())]) for part in passed):
                 rate = 0.5 * (float(rates[voxel]) + float(rates[near]))
+                length = math.dist(voxel, near)
                 edges[np.ravel_multi_index(voxel, shape), np.ravel_multi_index(near, shape)] = (
-                    math.dist(voxel, near) * rate
+                    rate * (length if by_length else 1.0) + length_cost * length
                 )
     rows, columns = zip(*edges, strict=True) if edges else ((), ())
     return csr_matrix((list(edges.values()), (rows, columns)), shape=(rates.size, rates.size))

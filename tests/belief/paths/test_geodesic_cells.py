@@ -1,6 +1,5 @@
-"""Geodesic Voronoi cells against a slow Dijkstra, by hand, and by what must hold of any cells."""
+"""Geodesic Voronoi cells against SciPy's Dijkstra, by hand, and by what must hold of any cells."""
 
-import heapq
 import itertools
 import math
 
@@ -8,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.sparse.csgraph import dijkstra
 
 from entropy_explore_env.belief.paths.geodesic_cells import (
     UNREACHED,
@@ -16,35 +16,15 @@ from entropy_explore_env.belief.paths.geodesic_cells import (
     tessellate,
 )
 from entropy_explore_env.errors import SettingError
+from tests.belief.paths.graphs import graph_of
 from tests.reference.scenes import SHAPES, drawn, seeds
 
 
-def slow_costs(rates, source, length_cost, by_length):
-    """Costs of the paths from one voxel to all, by a heap and a dictionary."""
-    size, found = rates.shape, {}
-    heap = [(0.0, source)] if math.isfinite(rates[source]) else []
-    while heap:
-        cost, here = heapq.heappop(heap)
-        if here in found:
-            continue
-        found[here] = cost
-        for step in itertools.product((-1, 0, 1), repeat=3):
-            passed = [
-                tuple(int(a + b) for a, b in zip(here, part, strict=True))
-                for part in itertools.product(*({0, along} for along in step))
-            ]
-            if not all(0 <= i < n for at in passed for i, n in zip(at, size, strict=True)):
-                continue
-            if any(math.isinf(rates[at]) for at in passed) or not any(step):
-                continue
-            there = tuple(int(a + b) for a, b in zip(here, step, strict=True))
-            length = math.sqrt(sum(map(abs, step)))
-            mean = 0.5 * (float(rates[here]) + float(rates[there]))
-            heapq.heappush(heap, (cost + mean * (length if by_length else 1.0) + length_cost * length, there))
-    out = np.full(size, np.inf)
-    for voxel, cost in found.items():
-        out[voxel] = cost
-    return out
+def slow_costs(graph, rates, sources):
+    """(K, X, Y, Z) costs of the paths from each of some voxels to all; inf from one that is impassable."""
+    costs = dijkstra(graph, indices=sources).reshape(-1, *rates.shape)
+    costs[np.isinf(rates.ravel()[sources])] = math.inf
+    return costs
 
 
 def drawn_rates(size, seed, walls):
@@ -59,16 +39,15 @@ def drawn_rates(size, seed, walls):
     st.sampled_from(SHAPES), seeds, st.sampled_from([0.0, 0.3]), st.sampled_from([0.0, 0.7]), st.booleans()
 )
 @drawn(16)
-def test_costs_and_cells_are_those_of_a_slow_dijkstra(size, seed, walls, length_cost, by_length):
+def test_costs_and_cells_are_those_of_dijkstra(size, seed, walls, length_cost, by_length):
     rates, rng = drawn_rates(size, seed, walls)
     if np.isinf(rates).all():
         rates[0, 0, 0] = 1.0
     sources = rng.integers(0, rates.size, 3)
     space = new_tessellation(size)
+    each = slow_costs(graph_of(rates, None, length_cost, by_length), rates, sources)
     for _ in range(2):  # the second time in the same space
         tessellate(space, rates, sources, length_cost, by_length)
-        places = [tuple(int(i) for i in np.unravel_index(source, size)) for source in sources]
-        each = np.stack([slow_costs(rates, place, length_cost, by_length) for place in places])
         np.testing.assert_allclose(space.costs, each.min(axis=0), rtol=1e-9)
         reached = np.isfinite(space.costs)
         assert (space.cells[~reached] == UNREACHED).all()
@@ -134,7 +113,7 @@ def test_costs_of_very_different_size_go_beyond_the_ring_of_buckets():
     rates[:, 4] = 3e4
     space = new_tessellation(rates.shape)
     tessellate(space, rates, np.array([0, 44]))
-    each = np.stack([slow_costs(rates, place, 0.0, True) for place in ((0, 0, 0), (4, 8, 0))])
+    each = slow_costs(graph_of(rates), rates, [0, 44])
     np.testing.assert_allclose(space.costs, each.min(axis=0), rtol=1e-9)
 
 
@@ -162,20 +141,6 @@ def test_what_is_refused(change, field):
     np.testing.assert_array_equal(space.half_cost, before)
 
 
-def path_cost(rates, path, length_cost, by_length):
-    """Cost of a path of neighbours, as `slow_costs` counts it; all that lies between two must be passable."""
-    total, places = 0.0, [tuple(int(i) for i in np.unravel_index(voxel, rates.shape)) for voxel in path]
-    for here, there in itertools.pairwise(places):
-        step = [b - a for a, b in zip(here, there, strict=True)]
-        assert max(map(abs, step)) == 1
-        box = tuple(slice(min(a, b), max(a, b) + 1) for a, b in zip(here, there, strict=True))
-        assert np.isfinite(rates[box]).all()
-        length = math.sqrt(sum(map(abs, step)))
-        mean = 0.5 * (float(rates[here]) + float(rates[there]))
-        total += mean * (length if by_length else 1.0) + length_cost * length
-    return total
-
-
 @drawn(30)
 @given(st.sampled_from(SHAPES), seeds, st.sampled_from([0.0, 0.01, 0.7]), st.booleans())
 def test_a_path_is_the_one_that_the_costs_of_its_cell_come_from(size, seed, length_cost, by_length):
@@ -184,6 +149,7 @@ def test_a_path_is_the_one_that_the_costs_of_its_cell_come_from(size, seed, leng
     space = new_tessellation(rates.shape)
     tessellate(space, rates, sources, length_cost, by_length)
     costs, cells = space.costs.reshape(-1), space.cells.reshape(-1)
+    graph = graph_of(rates, None, length_cost, by_length)
     for voxel in range(0, rates.size, 3):
         path = extract_path(space, rates, voxel, length_cost, by_length)
         if cells[voxel] == UNREACHED:
@@ -191,7 +157,8 @@ def test_a_path_is_the_one_that_the_costs_of_its_cell_come_from(size, seed, leng
             continue
         assert path[0] == sources[cells[voxel]] and path[-1] == voxel
         assert (cells[path] == cells[voxel]).all()
-        assert path_cost(rates, path, length_cost, by_length) == pytest.approx(costs[voxel], rel=1e-9)
+        steps = [graph[here, there] for here, there in itertools.pairwise(path.tolist())]
+        assert all(step > 0.0 for step in steps) and sum(steps) == pytest.approx(costs[voxel], rel=1e-9)
 
 
 def test_where_no_source_comes_and_for_other_costs_there_is_no_path():
