@@ -8,6 +8,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from tests.reference import rocha04
+
 UNEXPLORED, UNMAPPED, COVERED = 1, 2, 4
 
 
@@ -69,19 +71,10 @@ def seen_voxels(
     state: np.ndarray, start: Sequence[float], directions: np.ndarray, reach: float
 ) -> set[tuple[int, ...]]:
     """Unexplored voxels on rays from a place, up to and with the first that is believed covered."""
-    found = set()
+    size, found = tuple(state.shape), set()
     for direction in directions:
-        cuts = crossings(start, direction, reach)
-        for number, (a, b) in enumerate(itertools.pairwise(cuts)):
-            if b - a < 1e-9:
-                continue
-            voxel = tuple(math.floor(p + d * 0.5 * (a + b)) for p, d in zip(start, direction, strict=True))
-            if not all(0 <= i < n for i, n in zip(voxel, state.shape, strict=True)):
-                break
-            if state[voxel] & UNEXPLORED:
-                found.add(voxel)
-            if number > 0 and state[voxel] & COVERED:
-                break
+        ray = rocha04.trace(lambda v: bool(state[v] & COVERED), start, direction, size, reach, 1)
+        found.update(voxel for voxel in ray.voxels if state[voxel] & UNEXPLORED)
     return found
 
 
