@@ -254,6 +254,7 @@ ACCEPTED = [
     (Ending, {"time_limit_s": 1e-3}),
     (Channel, {"phase_s": 1.0, "repeats": 1000, "range_m": 1e6, "i_min_bits": 1e6}),
     (Channel, {"phase_s": 1e-3, "repeats": 1}),
+    (Channel, {"burst": 0, "summary_every_s": 10}),
     (Channel, {"order": "need", "burst": 0}),
     (Channel, {"content": "summaries", "summary_every_s": 0, "summary_threshold_bits": 0}),
     (Channel, {"content": "summaries", "summary_every_s": 3600, "summary_threshold_bits": 5}),
@@ -294,7 +295,6 @@ def test_rovers_stay_in_their_plane_and_look_up_and_down_but_not_in_plans():
 def test_settings_that_do_not_fit_each_other_are_refused():
     discrete = {"action": {"kind": "discrete"}}
     for settings, field in (
-        ({"ending": {"sigma_end": 30.0}}, "Ending.sigma_end"),
         ({"fiducials": {"number": 2, "positions_m": ((0.0, 0.0, 0.0),)}}, "Fiducials.number"),
         ({**discrete, "robot": {"reach_m": INF}}, "Action.kind"),
         ({**discrete, "observation": {"overlaps": True}}, "Observation.overlaps"),
