@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import pickle
-import re
 
 import numpy as np
 import pytest
@@ -42,18 +41,18 @@ def test_every_kind_of_file_is_a_world(tmp_path, loader):
             np.testing.assert_array_equal(load_world(str(loud), **sample.options).occupied, world.occupied)
 
 
-@pytest.mark.parametrize("name", ["castle", "castle.docx", "castle.bt.zip", ""])
-def test_a_suffix_that_nobody_knows_is_refused(name):
-    with pytest.raises(WorldError, match=r"\.bt \.ot \.yaml"):
-        load_world(name)
-
-
 @pytest.mark.parametrize(
-    ("name", "line"),
-    [("plan.npy", "World(Grid(a.shape"), ("house.IFC", ".glb"), ("house.dxf", ".png"), ("scan.e57", "pdal")],
+    ("name", "said"),
+    [
+        *((name, r"\.bt \.ot \.yaml") for name in ("castle", "castle.docx", "castle.bt.zip", "")),
+        ("plan.npy", r"convert it: .*World\(Grid\(a\.shape"),
+        ("house.IFC", r"convert it: .*\.glb"),
+        ("house.dxf", r"convert it: .*\.png"),
+        ("scan.e57", r"convert it: .*pdal"),
+    ],
 )
-def test_what_is_not_read_is_refused_with_what_converts_it(name, line):
-    with pytest.raises(WorldError, match=f"convert it: .*{re.escape(line)}"):
+def test_what_is_not_read_is_refused_with_what_is_or_what_converts_it(name, said):
+    with pytest.raises(WorldError, match=said):
         load_world(name)
 
 
