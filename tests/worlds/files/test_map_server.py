@@ -69,15 +69,6 @@ def test_the_lower_left_pixel_is_the_first_voxel(tmp_path):
     assert world.name == "map"
 
 
-@pytest.mark.parametrize("suffix", [".yaml", ".YML"])
-def test_png_and_pgm_give_the_same_world(tmp_path, suffix):
-    first = load_world(write(tmp_path, image=pgm(plan())))
-    (tmp_path / "plan.PNG").write_bytes(image(plan()))
-    path = tmp_path / f"other{suffix}"
-    path.write_bytes(YAML.replace(b"plan.pgm", b"plan.PNG"))
-    np.testing.assert_array_equal(load_world(path).occupied, first.occupied)
-
-
 IGNORED = pytest.mark.filterwarnings("ignore::entropy_explore_env.errors.WorldWarning")
 
 

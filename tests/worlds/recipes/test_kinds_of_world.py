@@ -40,26 +40,19 @@ def widest_m(plan, edge_m):
 
 
 @pytest.mark.parametrize(
-    ("scenario", "size_m"),
+    ("scenario", "size_m", "voxel_size_m", "robots"),
     [
-        (OCCLUSIONS, (100.0, 100.0)),
-        (LAB, (5.0, 4.6)),
-        (BHATTACHARYA_OFFICE, (17.0, 20.0)),
-        (BHATTACHARYA_CLUTTERED, (100.0, 78.3)),
+        (OCCLUSIONS, (100.0, 100.0), 0.5, 1),
+        (LAB, (5.0, 4.6), 0.1, 2),
+        (BHATTACHARYA_OFFICE, (17.0, 20.0), 0.1, 5),
+        (BHATTACHARYA_CLUTTERED, (100.0, 78.3), 0.1, 4),
     ],
 )
-def test_worlds_of_papers_have_their_size(scenario, size_m):
+def test_scenarios_of_papers_are_what_they_say(scenario, size_m, voxel_size_m, robots):
     assert tuple(scenario.grid.size_m[:2]) == pytest.approx(size_m)
-
-
-def test_what_the_papers_say_of_them():
-    assert LAB.grid.size_m[:2].prod() == pytest.approx(23.0) and LAB.grid.voxel_size_m == 0.1
-    assert LAB.robot.motion == "planar"
-    assert BHATTACHARYA_OFFICE.grid.shape == (170, 200, 1) and BHATTACHARYA_OFFICE.robots == 5
-    assert BHATTACHARYA_CLUTTERED.grid.shape == (1000, 783, 1) and BHATTACHARYA_CLUTTERED.robots == 4
-    sensor = OCCLUSIONS.sensor
-    assert (OCCLUSIONS.robots, sensor.max_range_m) == (1, 15.0)
-    assert np.degrees(sensor.field_of_view_rad[0]) == pytest.approx(90.0)
+    assert (scenario.grid.voxel_size_m, scenario.robots) == (voxel_size_m, robots)
+    assert LAB.robot.motion == "planar" and OCCLUSIONS.sensor.max_range_m == 15.0
+    assert np.degrees(OCCLUSIONS.sensor.field_of_view_rad[0]) == pytest.approx(90.0)
 
 
 def test_corridors_are_narrow_and_long():
