@@ -182,14 +182,6 @@ def test_robots_take_different_ends_of_a_corridor_unless_the_other_is_silent():
         assert bool(explorer.goal(heard, robot=1).viewpoint[0] > 10.0) is east
 
 
-def test_a_blocked_drive_is_not_tried_again(seen_from_start):
-    explorer = Explorer(voxel_size_m=EDGE_M)
-    explorer.set_map(seen_from_start)
-    first = explorer.goal(START)
-    again = explorer.goal(START, ended=eee.MoveEnd.OBSTACLE)
-    assert np.linalg.norm(first.viewpoint[:2] - again.viewpoint[:2]) > EDGE_M
-
-
 def test_scans_alone_make_a_map_that_grows():
     explorer, solid = Explorer(voxel_size_m=EDGE_M), plan_by_hand()
     seen = np.full(solid.shape, -1, np.int8)

@@ -113,10 +113,6 @@ def test_what_a_rule_returns_must_be_a_voxel(file, picked):
         run_mission(scripted_env(with_settings(BOX, {"robots": 1})), strategy, 0)
 
 
-def test_a_class_of_a_module_is_made():
-    assert isinstance(make_strategy("baselines.strategies.rules.gradient:GradientStrategy"), GradientStrategy)
-
-
 def test_a_file_imports_its_neighbours(file, monkeypatch):
     monkeypatch.setattr(sys, "path", sys.path.copy())
     (file.parent / "beside.py").write_text("from mine import Own\nclass Beside(Own): pass\n")
