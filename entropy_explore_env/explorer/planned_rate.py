@@ -7,7 +7,7 @@ every stop. What a robot is, and what its mission asks for, decides how it explo
 
 - Flying robots, and all in 3-D worlds: bits per time, with the recipe of narrow or of wide views.
 - Ground robots with a scanner that sees all around, in a plan, until the map has a given entropy: bits per
-  time, of scans imagined in a predicted map where much is predicted solid (`planner.foresight`).
+  time, of scans imagined in a predicted map where much is predicted solid (`missions.foresight`).
 - The same robots where everything is to be seen: frontier cells on short tours, see `planner.tour`.
   Bits per time would leave what is small until the end, and drive back for it.
 - The same robots where a part may stay unseen: bits per time, of unknown voxels alone.
@@ -24,9 +24,9 @@ from collections.abc import Callable
 import numpy as np
 
 from entropy_explore_env.belief.paths.search import Search
+from entropy_explore_env.missions.foresight import Foresight, LearnedForesight, foresees
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_candidates import ViewProposer
-from entropy_explore_env.planner.foresight import Foresight, LearnedForesight, foresees
 from entropy_explore_env.planner.tour import SharedTour
 from entropy_explore_env.planner.weights import PlannerWeights
 from entropy_explore_env.settings.changes import with_settings
@@ -65,7 +65,7 @@ class PlannedRate:
         """Take the weights of features by which candidates are chosen; None = by bits / s^c alone.
 
         Without weights, `foresight` makes what predicts unknown voxels in a mission that it suits
-        (`planner.foresight`); None = nothing is predicted.
+        (`missions.foresight`); None = nothing is predicted.
         """
         self.weights, self._foresight = weights, None if weights else foresight
 

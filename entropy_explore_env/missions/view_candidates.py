@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from entropy_explore_env.belief.paths.search import Search
+from entropy_explore_env.missions.foresight import Foresight
 from entropy_explore_env.missions.proposals import Known, locate, propose_to
 from entropy_explore_env.missions.rules import Rules, rules_of
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
-from entropy_explore_env.planner.foresight import Foresight
 from entropy_explore_env.planner.model import Proposer, new_proposers
 from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE, Kind
 from entropy_explore_env.planner.thresholds import NO_GAIN_BITS

@@ -11,7 +11,7 @@ from baselines.strategies import make_strategy
 from baselines.suites import find_suite, prediction
 from baselines.suites.results import Results
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.planner.foresight import foresees
+from entropy_explore_env.missions.foresight import foresees
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import SCENARIOS
 

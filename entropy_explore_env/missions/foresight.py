@@ -7,21 +7,28 @@ as in offices, that brings nothing, even with the true map in place of the predi
 
 from __future__ import annotations
 
+from collections import defaultdict, deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from entropy_explore_env.planner.thresholds import RENEWED_DECISIONS, RENEWED_M, SOLID_SHARE
+from entropy_explore_env.missions.view import RobotView
+from entropy_explore_env.planner.thresholds import (
+    GIVE_UP_BELOW,
+    GIVE_UP_DECISIONS,
+    RENEWED_DECISIONS,
+    RENEWED_M,
+    SOLID_SHARE,
+)
 from entropy_explore_env.prediction.crop import ROUNDING
 from entropy_explore_env.prediction.predictor import Prediction
-from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
 from entropy_explore_env.viewpoints.expected_scan import UNPREDICTED
 
-Foresight = Callable[[RobotKnowledge], np.ndarray]
+Foresight = Callable[[RobotView], np.ndarray]
 """What one robot knows → (V,) float32, of each voxel that it never measured the probability to stop a ray, or
 UNPREDICTED; what it says of other voxels does not count."""
 
@@ -43,20 +50,44 @@ class LearnedForesight:
     """What the shipped predictor says of unknown voxels in a plan, in one mission; a Foresight.
 
     A robot's prediction is renewed as it moves on, and after some decisions on one spot; at every decision it
-    took twice the time, and brought nothing.
+    took twice the time, and brought nothing. A robot to which its last decisions brought next to nothing goes
+    on without predictions: wrong ones, as of an opening that is no wall, would hold it for good.
     """
 
     def __init__(self) -> None:
         """Begin a mission."""
         self._latest: dict[int, _Predicted] = {}
+        self._course: defaultdict[int, deque[tuple[float, float]]] = defaultdict(_new_course)
+        """Robot number → time and bits gained at its last decisions."""
+        self._without: set[int] = set()
+        """Robots that go on without predictions."""
 
-    def __call__(self, view: RobotKnowledge) -> np.ndarray:
+    def __call__(self, view: RobotView) -> np.ndarray:
         """Return what was predicted last, or anew; a grid may grow from one decision to the next."""
+        if self._brings_little(view):
+            self._without.add(view.robot)
+        if view.robot in self._without:
+            return np.full(view.precision.size, UNPREDICTED, np.float32)
         latest = self._latest.get(view.robot)
         if latest is None or len(latest.solid) != view.precision.size or latest.is_old(view.pose):
             latest = self._latest[view.robot] = _Predicted(view.pose[:2].copy(), _predicted_solid(view))
         latest.decisions += 1
         return latest.solid
+
+    def _brings_little(self, view: RobotView) -> bool:
+        """Return whether a robot's last decisions brought few bits a second, beside its mean so far."""
+        course = self._course[view.robot]
+        course.append((view.time_s, view.gained_bits))
+        before_s, before_bits = course[0]
+        passed_s = view.time_s - before_s
+        if len(course) <= GIVE_UP_DECISIONS or passed_s <= 0.0:
+            return False
+        rate, mean_rate = (view.gained_bits - before_bits) / passed_s, view.gained_bits / view.time_s
+        return rate < GIVE_UP_BELOW * mean_rate
+
+
+def _new_course() -> deque[tuple[float, float]]:
+    return deque(maxlen=GIVE_UP_DECISIONS + 1)
 
 
 @dataclass
@@ -76,7 +107,7 @@ class _Predicted:
         return bool(moved_m >= RENEWED_M or self.decisions >= RENEWED_DECISIONS)
 
 
-def _predicted_solid(view: RobotKnowledge) -> np.ndarray:
+def _predicted_solid(view: RobotView) -> np.ndarray:
     prediction, grid = view.prediction, view.scenario.grid
     solid = np.full(grid.shape, UNPREDICTED, np.float32)
     (columns, across), (rows, along) = (_cells(prediction, grid, axis) for axis in (0, 1))
