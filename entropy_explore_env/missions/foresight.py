@@ -15,11 +15,11 @@ import numpy as np
 
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.planner.thresholds import (
-    GIVE_UP_BELOW,
-    GIVE_UP_DECISIONS,
+    COURSE_DECISIONS,
     RENEWED_DECISIONS,
     RENEWED_M,
     SOLID_SHARE,
+    TO_AND_FRO,
 )
 from entropy_explore_env.prediction.crop import ROUNDING
 from entropy_explore_env.prediction.predictor import Prediction
@@ -50,21 +50,21 @@ class LearnedForesight:
     """What the shipped predictor says of unknown voxels in a plan, in one mission; a Foresight.
 
     A robot's prediction is renewed as it moves on, and after some decisions on one spot; at every decision it
-    took twice the time, and brought nothing. A robot to which its last decisions brought next to nothing goes
-    on without predictions: wrong ones, as of an opening that is no wall, would hold it for good.
+    took twice the time, and brought nothing. A robot that drives to and fro goes on without predictions:
+    where those of one opening change with its place, it would do so for good.
     """
 
     def __init__(self) -> None:
         """Begin a mission."""
         self._latest: dict[int, _Predicted] = {}
-        self._course: defaultdict[int, deque[tuple[float, float]]] = defaultdict(_new_course)
-        """Robot number → time and bits gained at its last decisions."""
+        self._courses: defaultdict[int, deque[np.ndarray]] = defaultdict(_new_course)
+        """Robot number → (2,) x, y of where it was at its last decisions."""
         self._without: set[int] = set()
         """Robots that go on without predictions."""
 
     def __call__(self, view: RobotView) -> np.ndarray:
         """Return what was predicted last, or anew; a grid may grow from one decision to the next."""
-        if self._brings_little(view):
+        if self._goes_to_and_fro(view):
             self._without.add(view.robot)
         if view.robot in self._without:
             return np.full(view.precision.size, UNPREDICTED, np.float32)
@@ -74,20 +74,19 @@ class LearnedForesight:
         latest.decisions += 1
         return latest.solid
 
-    def _brings_little(self, view: RobotView) -> bool:
-        """Return whether a robot's last decisions brought few bits a second, beside its mean so far."""
-        course = self._course[view.robot]
-        course.append((view.time_s, view.gained_bits))
-        before_s, before_bits = course[0]
-        passed_s = view.time_s - before_s
-        if len(course) <= GIVE_UP_DECISIONS or passed_s <= 0.0:
-            return False
-        rate, mean_rate = (view.gained_bits - before_bits) / passed_s, view.gained_bits / view.time_s
-        return rate < GIVE_UP_BELOW * mean_rate
+    def _goes_to_and_fro(self, view: RobotView) -> bool:
+        """Return whether a robot drove far in its last decisions, and stayed in a small part of the plan."""
+        course = self._courses[view.robot]
+        course.append(view.pose[:2].copy())
+        places_m = np.array(course)
+        driven_m = np.linalg.norm(np.diff(places_m, axis=0), axis=1).sum()
+        across_m = np.linalg.norm(places_m.max(axis=0) - places_m.min(axis=0))
+        long_enough = len(course) == COURSE_DECISIONS and across_m >= RENEWED_M
+        return bool(long_enough and driven_m >= TO_AND_FRO * across_m)
 
 
-def _new_course() -> deque[tuple[float, float]]:
-    return deque(maxlen=GIVE_UP_DECISIONS + 1)
+def _new_course() -> deque[np.ndarray]:
+    return deque(maxlen=COURSE_DECISIONS)
 
 
 @dataclass

@@ -25,9 +25,9 @@ SOLID_SHARE = 0.25
 predicted (tuned: it lies between offices, whose walls are thin, and all other plans)."""
 RENEWED_M, RENEWED_DECISIONS = 1.0, 8
 """Metres that a robot moves, and decisions that it makes, until its prediction is renewed (tuned)."""
-GIVE_UP_DECISIONS, GIVE_UP_BELOW = 16, 0.05
-"""Decisions that have to bring this share of a mission's mean bits a second, or predictions are given up
-(tuned: shares of 0.03 and 0.1 did the same)."""
+COURSE_DECISIONS, TO_AND_FRO = 16, 6.0
+"""A robot drives to and fro if its way over the last decisions is this many times the diagonal of the box
+around its places (tuned: of a robot between two places it is 15)."""
 
 # Far places
 FIRST_RADIUS = 3.0

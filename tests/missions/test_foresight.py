@@ -13,7 +13,7 @@ from entropy_explore_env.missions import foresight
 from entropy_explore_env.missions.foresight import LearnedForesight, foresees
 from entropy_explore_env.missions.view_candidates import _foresee
 from entropy_explore_env.planner.thresholds import (
-    GIVE_UP_DECISIONS,
+    COURSE_DECISIONS,
     RENEWED_DECISIONS,
     RENEWED_M,
     SOLID_SHARE,
@@ -33,9 +33,7 @@ def view_of(solid, voxel_size_m=0.2, shape=SHAPE, origin_m=(0.0, 0.0), precision
     grid = Grid(shape, voxel_size_m, (*origin_m, 0.0))
     scenario = SimpleNamespace(grid=grid, sigma_prior=PRIOR**-0.5)
     pose = np.array([0.5, 0.5, 0.1, 0.0, 0.0])
-    view = SimpleNamespace(robot=0, pose=pose, precision=known, prediction=prediction, scenario=scenario)
-    view.time_s, view.gained_bits = 0.0, 0.0
-    return view
+    return SimpleNamespace(robot=0, pose=pose, precision=known, prediction=prediction, scenario=scenario)
 
 
 def drawn_cells(shape, seed=1):
@@ -87,19 +85,22 @@ def test_a_prediction_is_renewed_as_its_robot_moves_on_or_the_grid_grows():
     assert len(foreseen(view_of(drawn_cells((8, 11)), shape=(8, 11, 1)))) == 88
 
 
-@pytest.mark.parametrize(("bits", "given_up"), [(0.9, True), (1.1, False)])
-def test_a_robot_to_which_predictions_bring_next_to_nothing_goes_on_without(bits, given_up):
-    """After 100 s at 20 bits a second, a twentieth of the mean is 1 bit a second, and a little less later."""
+@pytest.mark.parametrize(
+    ("places_m", "without"),
+    [
+        ([(0.0, 0.0), (3.0, 4.0)], True),  # 15 times the diagonal
+        ([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (1.0, 0.0)], True),  # 7.5 times
+        ([(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (3.0, 0.0), (2.0, 0.0), (1.0, 0.0)], False),  # 5 times
+        ([(0.0, 0.0), (0.6, 0.7)], False),  # on one spot
+        ([(0.1 * n, 0.0) for n in range(400)], False),
+    ],
+)
+def test_a_robot_that_drives_to_and_fro_goes_on_without_predictions(places_m, without):
     foreseen, view = LearnedForesight(), view_of(drawn_cells(SHAPE[:2]))
-    for number in range(101):
-        view.time_s, view.gained_bits = float(number), 20.0 * number
-        assert (foreseen(view) > 0.0).all()
-    for number in range(1, GIVE_UP_DECISIONS + 1):
-        view.time_s, view.gained_bits = 100.0 + number / 8.0, 2000.0 + bits * number / 8.0
+    for number in range(3 * COURSE_DECISIONS):
+        view.pose[:2] = places_m[number % len(places_m)]
         found = foreseen(view)
-        assert (found == UNPREDICTED).all() == (given_up and number == GIVE_UP_DECISIONS), number
-    view.gained_bits += 1e6
-    assert (foreseen(view) == UNPREDICTED).all() == given_up
+        assert (found == UNPREDICTED).all() == (without and number + 1 >= COURSE_DECISIONS), number
     view.robot = 1
     assert (foreseen(view) > 0.0).all()
 
