@@ -228,7 +228,7 @@ class SuiteMission:
         """
         made = make_strategy(strategy)
         if isinstance(made, Bound):
-            made.tell(env)
+            made.tell_truth(env)
         timed, started = Stopwatch(made, _clock_s), time.perf_counter()
         if file is None:
             run_mission(env, timed, seed, options=self.options)

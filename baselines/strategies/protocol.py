@@ -50,9 +50,9 @@ class Strategy(Protocol):
 
 @runtime_checkable
 class Bound(Protocol):
-    """A strategy that is told the truth: what others could reach, never a rival."""
+    """A strategy that is told the truth. It shows what others could reach, and competes with none."""
 
-    def tell(self, env: EntropyExploreEnv) -> None:
+    def tell_truth(self, env: EntropyExploreEnv) -> None:
         """Tell it of the environment in which it will act."""
         ...
 

@@ -46,7 +46,7 @@ SUITES: dict[str, Callable[[bool], Suite]] = {
         prediction.tasks(quick),
         prediction.STRATEGIES,
         prediction.MEASURES,
-        reference=prediction.UNPREDICTED,
+        reference=prediction.WITHOUT,
     ),
 }
 """Name → what makes the suite, quick or whole, with the strategies of its table."""

@@ -70,7 +70,7 @@ class TrueMap(PlannedRate):
         super().__init__(foresight=lambda: self._solid)
         self._env: EntropyExploreEnv | None = None
 
-    def tell(self, env: EntropyExploreEnv) -> None:
+    def tell_truth(self, env: EntropyExploreEnv) -> None:
         """Take the environment whose world is the true map."""
         self._env = env
 
@@ -81,8 +81,8 @@ class TrueMap(PlannedRate):
         return world.occupied.astype(np.float32).reshape(-1)
 
 
-UNPREDICTED, CONSTANT, TRUE_MAP = (f"{__name__}:{each.__name__}" for each in (Unpredicted, Constant, TrueMap))
-STRATEGIES = (UNPREDICTED, "planned-rate", TRUE_MAP, CONSTANT)
+WITHOUT, CONSTANT, TRUE_MAP = (f"{__name__}:{each.__name__}" for each in (Unpredicted, Constant, TrueMap))
+STRATEGIES = (WITHOUT, "planned-rate", TRUE_MAP, CONSTANT)
 
 
 def tasks(quick: bool = False) -> tuple[Task, ...]:
@@ -112,11 +112,11 @@ def bounds_table(results: Results) -> str:
     head += [f"p = {Constant.STOPS}: time", "goal of time, met"]
     rows = []
     for task in results.tasks:
-        alone = results.values(task, UNPREDICTED, TIME)
+        alone = results.values(task, WITHOUT, TIME)
         cells = [task.name, len(alone), f"{alone.mean():.0f}"]
         for name in ("planned-rate", TRUE_MAP):
-            cells += [_shown(results.ratio(name, UNPREDICTED, measure, [task])) for measure in MEASURES]
-        cells.append(_shown(results.ratio(CONSTANT, UNPREDICTED, TIME, [task])))
+            cells += [_shown(results.ratio(name, WITHOUT, measure, [task])) for measure in MEASURES]
+        cells.append(_shown(results.ratio(CONSTANT, WITHOUT, TIME, [task])))
         rows.append([*cells, _judged(results, task)])
     return markdown_table(head, rows)
 
@@ -127,7 +127,7 @@ def _shown(ratio: Interval | None) -> str:
 
 def _judged(results: Results, task: Task) -> str:
     """Return the goal of a task, and whether the ratio and its whole interval are below it."""
-    goal, ratio = GOALS.get(task.name), results.ratio("planned-rate", UNPREDICTED, TIME, [task])
+    goal, ratio = GOALS.get(task.name), results.ratio("planned-rate", WITHOUT, TIME, [task])
     if goal is None or ratio is None:
         return "-"
     met = "yes" if ratio.high <= goal else "by the mean" if ratio.value <= goal else "**no**"

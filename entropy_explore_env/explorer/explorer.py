@@ -111,7 +111,8 @@ class Explorer:
             raise SettingError("arrival_m", arrival_m, "a finite number ≥ 0")
         self._task = task_of(scenario, robots, robot, sensor, voxel_size_m)
         planned = shipped_weights(weights) if isinstance(weights, str) else weights
-        self._strategy = PlannedRate(planned) if strategy is None else strategy
+        # goals may be asked for at any rate: predictions are tuned for robots that decide at stops
+        self._strategy = PlannedRate(planned, foresight=None) if strategy is None else strategy
         self._seed, self._arrival_m = check_seed(seed), float(arrival_m)
         self._seats = [Seat() for _ in range(self._task.robots)]
         self._heard = np.zeros(self._task.robots, HEARD)

@@ -24,7 +24,7 @@ from collections.abc import Callable
 import numpy as np
 
 from entropy_explore_env.belief.paths.search import Search
-from entropy_explore_env.missions.foresight import Foresight, LearnedForesight, foresees
+from entropy_explore_env.missions.foresight import Foresight, LearnedForesight, predictions_pay
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.planner.tour import SharedTour
@@ -67,7 +67,7 @@ class PlannedRate:
         Without weights, `foresight` makes what predicts unknown voxels in a mission that it suits
         (`missions.foresight`); None = nothing is predicted.
         """
-        self.weights, self._foresight = weights, None if weights else foresight
+        self.weights, self._foresight = weights, foresight if weights is None else None
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
@@ -82,7 +82,7 @@ class PlannedRate:
             self._tours.reset(scenario, rng)
             self._parts.append(self._tours)
         if not all(self._by_frontiers):
-            foresight = self._foresight() if self._foresight and foresees(scenario) else None
+            foresight = self._foresight() if self._foresight and predictions_pay(scenario) else None
             self._proposer = ViewProposer(self._proposing(scenario), rng, foresight=foresight)
             self._parts.append(self._proposer)
 

@@ -28,21 +28,21 @@ from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
 from entropy_explore_env.viewpoints.expected_scan import UNPREDICTED
 
-Foresight = Callable[[RobotView], np.ndarray]
-"""What one robot knows → (V,) float32, of each voxel that it never measured the probability to stop a ray, or
-UNPREDICTED; what it says of other voxels does not count."""
+Foresight = Callable[[RobotView], np.ndarray | None]
+"""What one robot knows → (V,) float32, of each voxel that is unknown to it the probability to stop a ray, or
+UNPREDICTED; what it says of known voxels does not count. None = nothing is predicted."""
 
 
-def foresees(scenario: Scenario) -> bool:
-    """Return whether predictions pay: for ground robots with scanners that see all around, in plans.
+def predictions_pay(scenario: Scenario) -> bool:
+    """Return whether predictions pay: for ground robots that see all around and decide at stops, in plans.
 
-    Where the mission is over when enough is seen, they were no better, even with the true map.
+    Missions that end when enough is seen took as long, even with the true map in place of the prediction;
+    robots that decide under way turned back too often.
     """
-    planar = scenario.grid.flat and all(kind.robot.motion == "planar" for kind in scenario.kinds)
-    return (
-        planar
-        and not scenario.ending.by_seen
-        and all(sees_all_around(kind.sensor) for kind in scenario.kinds)
+    plans = scenario.grid.flat and not scenario.ending.by_seen
+    return plans and all(
+        kind.robot.motion == "planar" and kind.robot.redecide == "at_stop" and sees_all_around(kind.sensor)
+        for kind in scenario.kinds
     )
 
 
@@ -62,15 +62,16 @@ class LearnedForesight:
         self._without: set[int] = set()
         """Robots that go on without predictions."""
 
-    def __call__(self, view: RobotView) -> np.ndarray:
+    def __call__(self, view: RobotView) -> np.ndarray | None:
         """Return what was predicted last, or anew; a grid may grow from one decision to the next."""
         if self._goes_to_and_fro(view):
             self._without.add(view.robot)
         if view.robot in self._without:
-            return np.full(view.precision.size, UNPREDICTED, np.float32)
+            return None
         latest = self._latest.get(view.robot)
-        if latest is None or len(latest.solid) != view.precision.size or latest.is_old(view.pose):
-            latest = self._latest[view.robot] = _Predicted(view.pose[:2].copy(), _predicted_solid(view))
+        if latest is None or latest.voxels != view.precision.size or latest.is_old(view.pose):
+            solid, place_m = _predicted_solid(view), view.pose[:2].copy()
+            latest = self._latest[view.robot] = _Predicted(place_m, view.precision.size, solid)
         latest.decisions += 1
         return latest.solid
 
@@ -95,8 +96,10 @@ class _Predicted:
 
     place_m: np.ndarray
     """(2,) x, y of where it was."""
-    solid: np.ndarray
-    """(V,) of a Foresight."""
+    voxels: int
+    """Of the grid then."""
+    solid: np.ndarray | None
+    """What a Foresight says."""
     decisions: int = 0
     """Number of decisions that were made by it."""
 
@@ -106,16 +109,17 @@ class _Predicted:
         return bool(moved_m >= RENEWED_M or self.decisions >= RENEWED_DECISIONS)
 
 
-def _predicted_solid(view: RobotView) -> np.ndarray:
+def _predicted_solid(view: RobotView) -> np.ndarray | None:
     prediction, grid = view.prediction, view.scenario.grid
-    solid = np.full(grid.shape, UNPREDICTED, np.float32)
     (columns, across), (rows, along) = (_cells(prediction, grid, axis) for axis in (0, 1))
     guess = prediction.solid[np.ix_(across, along)]
     unknown = view.precision[columns, rows, 0] <= view.scenario.sigma_prior**-2 * (1.0 + ROUNDING)
-    if unknown.any() and guess[unknown].mean() >= SOLID_SHARE:
-        # a ray across a cell of several voxels stops in one of them
-        voxels = min(grid.voxel_size_m / prediction.cell_m, 1.0)
-        solid[columns, rows, 0] = 1.0 - (1.0 - guess) ** voxels
+    if not unknown.any() or guess[unknown].mean() < SOLID_SHARE:
+        return None
+    solid = np.full(grid.shape, UNPREDICTED, np.float32)
+    # a ray across a cell of several voxels stops in one of them
+    voxels = min(grid.voxel_size_m / prediction.cell_m, 1.0)
+    solid[columns, rows, 0] = 1.0 - (1.0 - guess) ** voxels
     return solid.reshape(-1)
 
 

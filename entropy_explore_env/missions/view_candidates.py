@@ -131,10 +131,13 @@ class ViewProposer:
         return self._candidates[robot, number]["viewpoint"].copy()
 
 
-def _foresee(solid: np.ndarray, scratch: ScanScratch) -> None:
+def _foresee(solid: np.ndarray | None, scratch: ScanScratch) -> None:
     """Have scans imagined in a predicted map, and several of them at one place, if anything is predicted."""
-    scratch.solid[:] = solid
-    scratch.scans[0] = MOST_SCANS if (solid != UNPREDICTED).any() else 1
+    if solid is not None:
+        scratch.solid[:] = solid
+    elif scratch.scans[0] > 1:
+        scratch.solid[:] = UNPREDICTED
+    scratch.scans[0] = 1 if solid is None else MOST_SCANS
 
 
 def writable(array: np.ndarray) -> np.ndarray:

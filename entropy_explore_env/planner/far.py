@@ -105,9 +105,9 @@ def _fill_far(proposer, situation, state, options):
 def propose_far(proposer, situation, state):
     """Fill `scratch.far` with far viewpoints, evaluated; the nearer half of the world first.
 
-    Paths are searched farther and farther until no place beyond could be worth more; between cells of several
-    voxels, which takes little time, everywhere in the second search. The goal to which the robot is on its
-    way comes last, if there is one.
+    Paths are searched farther and farther until no place beyond could be worth more by one scan; between
+    cells of several voxels, which takes little time, everywhere in the second search. The goal to which the
+    robot is on its way comes last, if there is one.
 
     Args:
         proposer: See `model`; paths within reach have been searched.

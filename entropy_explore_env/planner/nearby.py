@@ -130,7 +130,7 @@ def _vary(proposer, situation, spread, at):
 
 
 @lean_kernel
-def _weigh(proposer, situation, filled, option):
+def _fill_value(proposer, situation, filled, option):
     """Fill in the bits of a scan at an OPTION, and what it is worth with the number of scans that pays most.
 
     Args:
@@ -167,7 +167,7 @@ def evaluate(proposer, situation, scan, options, far):
             option.seconds = straight_seconds(belief, edge_m, drive, here, at, scratch.scan)
         option.bits, option.stop_bits, option.value = 0.0, 0.0, 0.0
         if option.seconds < math.inf:
-            _weigh(proposer, situation, fill_bits(belief, scan, at, scratch.scan), option)
+            _fill_value(proposer, situation, fill_bits(belief, scan, at, scratch.scan), option)
         moved = at[0] != here[0] or at[1] != here[1] or at[2] != here[2]
         option.kind = _NEAR if moved else _SPOT
         copy_numbers(at, option.goal)

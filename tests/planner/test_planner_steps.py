@@ -13,7 +13,7 @@ from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.planner.far import first_stop, propose_far
 from entropy_explore_env.planner.memory import trust_and_clearance, worth_bits
 from entropy_explore_env.planner.model import Situation, new_proposers
-from entropy_explore_env.planner.nearby import cost_of, propose_nearby, start_paths
+from entropy_explore_env.planner.nearby import cost_of, evaluate, propose_nearby, start_paths
 from entropy_explore_env.planner.propose import choose
 from entropy_explore_env.planner.recipe import ALL_AROUND, NARROW_PLANNED, NARROW_STRAIGHT
 from entropy_explore_env.planner.records import EXPERIENCE, KNOWLEDGE, MATE, Kind
@@ -21,6 +21,7 @@ from entropy_explore_env.planner.states import PlannerState
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import BOX, OFFICE, OFFICE_3D
+from entropy_explore_env.viewpoints.expected_scan import fill_bits
 from entropy_explore_env.worlds.world import World
 
 ACTION = {"kind": "candidates", "candidates": 1}
@@ -125,6 +126,31 @@ def test_far_places_are_known_near_what_is_unknown_and_the_goal_is_last(far):
     assert (frontier_block > 10.0).all() and (frontier_block < 20.0).all()
     straight = np.linalg.norm(places["viewpoint"][:count, :3] - HERE[:3], axis=1) * 0.1
     assert (places["seconds"][:count] > straight / PLAN.robot.max_speed_m_s).all()
+
+
+@pytest.mark.parametrize("most", [1, 2, 8])
+def test_a_viewpoint_is_worth_the_number_of_scans_that_pays_most(most):
+    """In a known plan, where further scans bring nearly as much as the first one."""
+    proposer, shape = new_proposers(PLAN, predicted=True)[0], PLAN.grid.shape
+    situation = situation_of(PLAN, np.zeros(shape), np.full(shape, 2000.0))
+    scratch, drive = proposer.scratch, proposer.drive
+    scratch.scan.scans[0] = most
+    start_paths(proposer, situation)
+    options = scratch.pool[:2]
+    options["viewpoint"] = [(*HERE[:3], 0.0, 0.0), (18.5, 18.5, 0.5, 0.0, 0.0)]
+    evaluate(proposer, situation, proposer.exact, options, False)
+    values = {1: [], most: []}
+    for option in options:
+        fill_bits(situation.belief, proposer.exact, option["viewpoint"], scratch.scan)
+        found = [
+            scratch.scan.bits[n] / (option["seconds"] + (2**n - 1) * drive.scan_time_s) ** ALL_AROUND.exponent
+            for n in range(1 + int(math.log2(most)))
+        ]
+        assert option["bits"] == pytest.approx(scratch.scan.bits[0])
+        assert option["value"] == pytest.approx(max(found))
+        values[1].append(found[0])
+        values[most].append(max(found))
+    assert (values[most][1] > values[1][1]) == (most > 1)
 
 
 def test_a_depleted_planner_evaluates_other_places_each_time():

@@ -11,7 +11,7 @@ from baselines.strategies import make_strategy
 from baselines.suites import find_suite, prediction
 from baselines.suites.results import Results
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.missions.foresight import foresees
+from entropy_explore_env.missions.foresight import predictions_pay
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import SCENARIOS
 
@@ -22,7 +22,7 @@ def test_its_worlds_are_tests_and_its_missions_those_in_which_predictions_pay():
     suite = find_suite("prediction")
     assert {task.name for task in suite.tasks} >= set(prediction.GOALS)
     scenarios = [place.scenario for task in suite.tasks for place in task.places]
-    assert all(map(foresees, scenarios))
+    assert all(map(predictions_pay, scenarios))
     dungeons = [place.name for place in suite.tasks[-1].places]
     assert dungeons == [f"dungeon-{number}" for number in range(2, 101, 2)]
     assert {each.split for each in scenarios[: len(prediction.TEAMS)]} == {"test"}
@@ -32,7 +32,7 @@ def test_the_bound_is_told_the_true_map():
     bound = make_strategy(prediction.TRUE_MAP)
     env = scripted_env(CORRIDOR, ending={"time_limit_s": 20.0})
     env.reset(seed=3)
-    bound.tell(env)
+    bound.tell_truth(env)
     world = env.missions.worlds[0]
     assert np.array_equal(bound._solid(None).reshape(world.grid.shape), world.occupied)
     with pytest.raises(SettingError, match="in the suite `prediction`"):
