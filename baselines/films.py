@@ -19,7 +19,7 @@ from PIL import Image, ImageDraw
 from baselines.cli.arguments import make_folder, parse, run_command
 from baselines.cli.mission_outputs import film_moment
 from baselines.experiments.mission import run_mission, scripted_env
-from baselines.strategies import make_strategy, recommended
+from baselines.strategies import make_strategy, recommended, shown_name
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.picture_text import shortened
 from entropy_explore_env.reports.animation import Film, animate
@@ -79,9 +79,10 @@ def main(words: Sequence[str]) -> int:
         shown = [each for each in (strategy, args.beside) if each is not None]
         films = [filmed(scenario, each, args.seed, args.pictures) for each in shown]
         pictures = (shrunk(picture, args.width) for picture in films[0].pictures(_LAST))
+        titles = [shown_name(each) for each in shown]
         if len(films) > 1:
-            pictures = beside_each_other(films, shown, args.width)
-        title = "-".join([name, *shown] if len(films) > 1 else [name]).replace(":", "-")
+            pictures = beside_each_other(films, titles, args.width)
+        title = "-".join([name, *titles] if len(films) > 1 else [name]).replace(":", "-")
         path = args.out / f"{title}.webp"
         animate(pictures, path, _FRAME_S)
         print(f"{path}, {path.stat().st_size / 1000:,.0f} kB")
