@@ -11,7 +11,7 @@ from baselines.experiments.mission import run_mission, scripted_env
 from entropy_explore_env.explorer.planned_rate import PlannedRate
 from entropy_explore_env.missions import foresight
 from entropy_explore_env.missions.foresight import LearnedForesight, predictions_pay
-from entropy_explore_env.missions.view_candidates import _foresee
+from entropy_explore_env.missions.view_candidates import ViewProposer, _foresee
 from entropy_explore_env.planner.thresholds import (
     COURSE_DECISIONS,
     RENEWED_DECISIONS,
@@ -135,6 +135,16 @@ def test_several_scans_count_where_something_is_predicted():
         _foresee(given, scratch)
         assert scratch.scans[0] == most
         assert np.array_equal(scratch.solid, np.full(6, UNPREDICTED) if given is None else given)
+
+
+def test_a_proposer_whose_grid_has_grown_predicts_on():
+    plan = with_settings(
+        SCENARIOS["corridor"], {"robots": 1, "action": {"kind": "candidates", "candidates": 1}}
+    )
+    larger = with_settings(plan, {"grid": {"shape": (310, 205, 1)}})
+    proposer = ViewProposer(plan, np.random.default_rng(0), foresight=LearnedForesight())
+    proposer.grow(larger, np.zeros(3))
+    assert [len(each.scratch.scan.solid) for each in proposer._proposers] == [larger.grid.voxels]
 
 
 def goals_of(strategy, scenario):
