@@ -7,7 +7,6 @@ import pytest
 
 from baselines.experiments.mission import SuiteMission, scripted_env
 from baselines.experiments.statistics import Interval
-from baselines.strategies import make_strategy
 from baselines.suites import find_suite, prediction
 from baselines.suites.results import Results
 from entropy_explore_env.errors import SettingError
@@ -29,14 +28,14 @@ def test_its_worlds_are_tests_and_its_missions_those_in_which_predictions_pay():
 
 
 def test_the_bound_is_told_the_true_map():
-    bound = make_strategy(prediction.TRUE_MAP)
+    bound = prediction.TrueMap()
     env = scripted_env(CORRIDOR, ending={"time_limit_s": 20.0})
     env.reset(seed=3)
     bound.tell_truth(env)
     world = env.missions.worlds[0]
     assert np.array_equal(bound._solid(None).reshape(world.grid.shape), world.occupied)
     with pytest.raises(SettingError, match="in the suite `prediction`"):
-        make_strategy(prediction.TRUE_MAP)._solid(None)
+        prediction.TrueMap()._solid(None)
 
 
 def test_missions_of_all_planners_differ():
