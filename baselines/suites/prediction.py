@@ -24,11 +24,16 @@ from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.scenarios import SCENARIOS
 
 TEAMS = (
-    *(("corridor", 1), ("corridor", 3), ("hybrid", 1), ("hybrid", 3)),
-    *(("cluttered", 1), ("office", 1), ("office", 3)),
+    ("corridor", 1),
+    ("corridor", 3),
+    ("hybrid", 1),
+    ("hybrid", 3),
+    ("cluttered", 1),
+    ("office", 1),
+    ("office", 3),
+    ("warehouse", 4),
 )
 QUICK_TEAMS = TEAMS[:1]
-WAREHOUSE = ("warehouse", 4)
 MEASURES = (TIME, PATH)
 _DUNGEONS, _QUICK_DUNGEONS = range(2, 101, 2), range(2, 6, 2)
 DUNGEONS = "dungeons, 1 robot"
@@ -55,7 +60,7 @@ class Constant(PlannedRate):
     STOPS = 0.3
 
     def __init__(self) -> None:
-        """Predict the same of all voxels."""
+        """Take the same probability for all voxels."""
         super().__init__(foresight=lambda: self._solid)
 
     def _solid(self, view: RobotKnowledge) -> np.ndarray:
@@ -93,12 +98,10 @@ def tasks(quick: bool = False) -> tuple[Task, ...]:
     alone = {"robots": 1, "robot": {"body_radius_m": 0.0}, "track_truth": True}
     return (
         *(
-            task_in(team_name(name, robots), SCENARIOS[name], starts, robots=robots)
+            task_in(
+                team_name(name, robots), SCENARIOS.get(name) or in_world(base, name), starts, robots=robots
+            )
             for name, robots in (QUICK_TEAMS if quick else TEAMS)
-        ),
-        *(
-            task_in(team_name(name, robots), in_world(base, name), starts, robots=robots)
-            for name, robots in (() if quick else (WAREHOUSE,))
         ),
         Task(DUNGEONS, tuple(Place(name, in_world(base, name, alone), 1) for name in dungeons)),
     )
@@ -122,7 +125,7 @@ def bounds_table(results: Results) -> str:
 
 
 def _shown(ratio: Interval | None) -> str:
-    return "-" if ratio is None else f"{ratio.value:.2f} ({ratio.low:.2f} … {ratio.high:.2f})"
+    return "-" if ratio is None else f"{ratio:.2f}"
 
 
 def _judged(results: Results, task: Task) -> str:

@@ -174,7 +174,7 @@ def _relax(white, black, white_shares, black_shares, factor, sweeps, tolerance):
         white: (X + 2, W) float64, heights of one colour, which a sweep relaxes first; see `_by_colour`.
         black: (X + 2, W) float64, those of the other.
         white_shares: (X + 2, W) float64: of columns to relax, ω over how many neighbours they have, or 0.
-        black_shares: (X + 2, W) float64, likewise.
+        black_shares: (X + 2, W) float64, those of the other.
         factor: ω.
         sweeps: Most sweeps.
     """
