@@ -47,15 +47,7 @@ from entropy_explore_env.prediction.weights import FEATURES, read_network
 from entropy_explore_env.settings.validation import check_whole
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.writing import write_atomically
-from training.map_samples import (
-    RECIPES,
-    Samples,
-    as_channels,
-    make_samples,
-    read_samples,
-    sampled_missions,
-    unmeasured,
-)
+from training.map_samples import RECIPES, STEPS, Samples, make_samples, read_samples, sampled_missions
 from training.map_scores import draw_figure, figures_of, nearest_shares, predictions, scored
 
 _STOPPED = "this mission or epoch is done first; the same command goes on"
@@ -77,7 +69,7 @@ class Args(WorkerOptions):
 
     usual: ClassVar = (
         *("recipes", "leave_out", "out", "weights", "missions", "validation_missions", "snapshots"),
-        *("epochs", "batch", "rate", "seed", "threads", "jobs", "cluster", "json"),
+        *("epochs", "batch", "rate", "seed", "threads", "device", "jobs", "cluster", "json"),
     )
 
     recipes: tuple[str, ...] = RECIPES
@@ -104,6 +96,8 @@ class Args(WorkerOptions):
     """Seed of missions, of weights and of the order of samples."""
     threads: int = 2
     """Threads for learning; sums may come out in another order with another number."""
+    device: str = "auto"
+    """PyTorch's device for learning, such as cpu or cuda; auto = a GPU if there is one. Sums differ, too."""
     json: bool = False
     """Print one JSON object and nothing else."""
 
@@ -166,8 +160,23 @@ def check(args: Args) -> None:
     for name in ("missions", "validation_missions", "snapshots", "epochs", "batch", "threads"):
         check_whole(name, getattr(args, name), 1)
     check_whole("seed", args.seed, 0)
+    device_of(args)
     if not 0.0 < args.rate < math.inf:
         raise SettingError("rate", args.rate, "a number above 0")
+
+
+def device_of(args: Args) -> torch.device:
+    """Return the device on which a network learns.
+
+    Raises:
+        SettingError: PyTorch does not know it, or has no such device here.
+    """
+    if args.device == "auto":
+        return torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    try:
+        return torch.empty(0, device=args.device).device
+    except (RuntimeError, AssertionError, NotImplementedError):
+        raise SettingError("device", args.device, "auto, cpu, or a device that PyTorch has here") from None
 
 
 def _tell(args: Args, text: str, now: bool = True) -> None:
@@ -224,17 +233,26 @@ def masked_loss(logits: torch.Tensor, truth: torch.Tensor, asked: torch.Tensor) 
     return (losses * asked).sum() / asked.sum().clamp(min=1.0)
 
 
-def drawn_batch(samples: Samples, chosen: np.ndarray, rng: np.random.Generator) -> list[torch.Tensor]:
-    """Return cells, truth and what is asked for of some samples, all turned and mirrored in one way."""
-    cells, truth = samples.cells[chosen], samples.truth[chosen]
-    asked = unmeasured(cells)
+def drawn_batch(
+    cells: torch.Tensor, truth: torch.Tensor, chosen: torch.Tensor, rng: np.random.Generator
+) -> list[torch.Tensor]:
+    """Return channels, truth and what is asked for of some samples, all turned and mirrored in one way.
+
+    Args:
+        cells: (N, 3, C, C) uint8 of all samples; like all tensors on the device for learning.
+        truth: (N, C, C) bool.
+        chosen: (B,) int64, numbers of samples.
+        rng: Draws turn and mirroring.
+    """
     turns, mirrored = int(rng.integers(4)), bool(rng.integers(2))
     batch = []
-    for values in (as_channels(cells), truth.astype(np.float32), asked.astype(np.float32)):
-        turned = np.rot90(values, turns, axes=(-2, -1))
-        turned = turned.swapaxes(-2, -1) if mirrored else turned
-        batch.append(torch.from_numpy(np.ascontiguousarray(turned)))
-    return [batch[0].contiguous(memory_format=torch.channels_last), *batch[1:]]
+    for values in (cells[chosen], truth[chosen]):
+        turned = torch.rot90(values, turns, dims=(-2, -1))
+        batch.append(turned.transpose(-2, -1) if mirrored else turned)
+    drawn, solid = batch
+    channels = (drawn.float() / STEPS).contiguous(memory_format=torch.channels_last)
+    asked = (drawn == 0).all(dim=1)  # as `unmeasured`
+    return [channels, solid.float().contiguous(), asked.float().contiguous()]
 
 
 def rate_at(args: Args, step: int, steps: int) -> float:
@@ -249,38 +267,38 @@ def train(args: Args, samples: Samples, interruption: Interruption) -> UNet | No
     """Return a trained network, the moving average of its weights; None if Ctrl-C stopped that."""
     torch.set_num_threads(args.threads)
     torch.manual_seed(args.seed)
-    model = UNet()
-    model.to(memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue] - twice as fast
+    device, model = device_of(args), UNet()
+    model.to(device, memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue] - twice as fast
+    cells, truth = (torch.from_numpy(values).to(device) for values in samples)
     optimiser = torch.optim.AdamW(model.parameters(), lr=args.rate, weight_decay=_DECAY)
     average = model.named()
     count = len(samples.truth)
     begun = _resume(args, model, optimiser, average)
     steps_each = math.ceil(count / args.batch)
     for epoch in range(begun, args.epochs):
-        rng, total = np.random.default_rng([args.seed, epoch]), 0.0
-        order = rng.permutation(count)
+        rng, total = np.random.default_rng([args.seed, epoch]), torch.zeros((), device=device)
+        order = torch.from_numpy(rng.permutation(count)).to(device)
         for place in range(steps_each):
             step = epoch * steps_each + place
             for group in optimiser.param_groups:
                 group["lr"] = rate_at(args, step, args.epochs * steps_each)
-            cells, truth, asked = drawn_batch(
-                samples, order[place * args.batch : (place + 1) * args.batch], rng
-            )
-            loss = masked_loss(model(cells), truth, asked)
+            chosen = order[place * args.batch : (place + 1) * args.batch]
+            channels, solid, asked = drawn_batch(cells, truth, chosen, rng)
+            loss = masked_loss(model(channels), solid, asked)
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
-            total += loss.item()
+            total += loss.detach()
             kept = min(_AVERAGED, (1.0 + step) / (10.0 + step))
             with torch.no_grad():
                 for name, values in model.state_dict().items():
                     average[name].lerp_(values, 1.0 - kept)
-        if not math.isfinite(total):
+        bits = float(total) / steps_each / math.log(2.0)
+        if not math.isfinite(bits):
             raise SettingError(
                 "rate", args.rate, f"a rate at which the loss stays finite (epoch {epoch + 1})"
             )
         _save(args, epoch + 1, model, optimiser, average)
-        bits = total / steps_each / math.log(2.0)
         _tell(args, f"epoch {epoch + 1} of {args.epochs}: {bits:.4f} bits a cell")
         if interruption.asked and epoch + 1 < args.epochs:
             return None

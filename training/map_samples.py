@@ -46,7 +46,7 @@ _RANGES_M = (4.5, 8.0, 8.0)
 _RAYS_APART_RAD = np.pi / 180
 _TEAMS = (1, 1, 2, 3)
 _TIME_LIMIT_S = 3600.0
-_LEVELS = 252
+STEPS = 252
 """Steps in which shares of voxels are kept."""
 
 
@@ -121,7 +121,7 @@ def sample_mission(sampled: Sampled) -> bytes:
         if deciding:
             view = env.view(deciding[int(rng.integers(len(deciding)))])
             cells, truth = crop_and_truth(env, view)
-            crops.append(np.rint(cells * _LEVELS).astype(np.uint8))
+            crops.append(np.rint(cells * STEPS).astype(np.uint8))
             truths.append(truth)
 
     run_mission(env, strategy, int(rng.integers(2**62)), after_step=note)
@@ -194,4 +194,4 @@ def unmeasured(cells: np.ndarray) -> np.ndarray:
 
 def as_channels(cells: np.ndarray) -> np.ndarray:
     """Return kept channels as the network reads them, float32."""
-    return cells.astype(np.float32) / np.float32(_LEVELS)
+    return cells.astype(np.float32) / np.float32(STEPS)

@@ -180,6 +180,8 @@ def test_a_recipe_that_is_left_out_is_told_of_and_not_learned(started, monkeypat
         ("--epochs 0", "epochs = 0"),
         ("--rate 0", "rate = 0.0"),
         ("--rate inf", "rate = inf"),
+        ("--device tpu", "device = 'tpu': expected auto, cpu"),
+        ("--device cuda:99", "device = 'cuda:99'"),
         ("--weights missing.safetensors", "No such file"),
     ],
 )
@@ -220,9 +222,9 @@ def test_turns_and_mirrors_move_cells_and_truth_together():
     cells = np.zeros((2, 3, CELLS, CELLS), np.uint8)
     shown = rng.random(truth.shape) < 0.5
     cells[:, SOLID][shown & truth], cells[:, FREE][shown & ~truth] = 252, 252
-    forms = set()
+    given, forms = (torch.from_numpy(cells), torch.from_numpy(truth), torch.tensor([1])), set()
     for _ in range(40):
-        told, solid, asked = drawn_batch(Samples(cells, truth), np.array([1]), rng)
+        told, solid, asked = drawn_batch(*given, rng)
         known = asked == 0.0
         assert torch.equal(told[:, SOLID][known], solid[known])
         assert torch.equal(told[:, FREE][known], 1.0 - solid[known])
