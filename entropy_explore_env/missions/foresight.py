@@ -22,7 +22,7 @@ from entropy_explore_env.planner.thresholds import (
     TO_AND_FRO,
 )
 from entropy_explore_env.prediction.crop import ROUNDING
-from entropy_explore_env.prediction.predictor import Prediction
+from entropy_explore_env.prediction.predictor import Prediction, Predictor
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
@@ -47,15 +47,16 @@ def predictions_pay(scenario: Scenario) -> bool:
 
 
 class LearnedForesight:
-    """What the shipped predictor says of unknown voxels in a plan, in one mission; a Foresight.
+    """What a predictor says of unknown voxels in a plan, in one mission; a Foresight.
 
     A robot's prediction is renewed as it moves on, and after some decisions on one spot; at every decision it
     took twice the time, and brought nothing. A robot that drives to and fro goes on without predictions:
     where those of one opening change with its place, it would do so for good.
     """
 
-    def __init__(self) -> None:
-        """Begin a mission."""
+    def __init__(self, predictor: Predictor | None = None) -> None:
+        """Begin a mission; without a predictor, take that of the library."""
+        self._predictor = predictor
         self._latest: dict[int, _Predicted] = {}
         self._courses: defaultdict[int, deque[np.ndarray]] = defaultdict(_new_course)
         """Robot number → (2,) x, y of where it was at its last decisions."""
@@ -70,7 +71,8 @@ class LearnedForesight:
             return None
         latest = self._latest.get(view.robot)
         if latest is None or latest.voxels != view.precision.size or latest.is_old(view.pose):
-            solid, place_m = _predicted_solid(view), view.pose[:2].copy()
+            predicted = view.prediction if self._predictor is None else view.predicted_by(self._predictor)
+            solid, place_m = _predicted_solid(view, predicted), view.pose[:2].copy()
             latest = self._latest[view.robot] = _Predicted(place_m, view.precision.size, solid)
         latest.decisions += 1
         return latest.solid
@@ -109,8 +111,8 @@ class _Predicted:
         return bool(moved_m >= RENEWED_M or self.decisions >= RENEWED_DECISIONS)
 
 
-def _predicted_solid(view: RobotView) -> np.ndarray | None:
-    prediction, grid = view.prediction, view.scenario.grid
+def _predicted_solid(view: RobotView, prediction: Prediction) -> np.ndarray | None:
+    grid = view.scenario.grid
     (columns, across), (rows, along) = (_cells(prediction, grid, axis) for axis in (0, 1))
     guess = prediction.solid[np.ix_(across, along)]
     unknown = view.precision[columns, rows, 0] <= view.scenario.sigma_prior**-2 * (1.0 + ROUNDING)

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from entropy_explore_env.prediction.predictor import Prediction, shipped_predictor
+from entropy_explore_env.prediction.predictor import Prediction, Predictor, shipped_predictor
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
@@ -138,9 +138,13 @@ class RobotKnowledge:
         Raises:
             SettingError: The map holds a number that is not finite.
         """
+        return self.predicted_by(shipped_predictor())
+
+    def predicted_by(self, predictor: Predictor) -> Prediction:
+        """Return the same of another predictor: see `prediction`."""
         grid, radius_m = self.scenario.grid, self.kind.robot.body_radius_m
         known = (self.mean, self.precision, self.scenario.sigma_prior)
-        return shipped_predictor().predict(grid, *known, self.pose, radius_m)
+        return predictor.predict(grid, *known, self.pose, radius_m)
 
     @property
     def planar(self) -> bool:

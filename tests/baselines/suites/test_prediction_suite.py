@@ -13,6 +13,7 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.foresight import predictions_pay
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import SCENARIOS
+from tests.prediction.networks import file_bytes, random_tensors
 
 CORRIDOR = with_settings(SCENARIOS["corridor"], {"split": "validation", "track_truth": True})
 
@@ -36,6 +37,21 @@ def test_the_bound_is_told_the_true_map():
     assert np.array_equal(bound._solid(None).reshape(world.grid.shape), world.occupied)
     with pytest.raises(SettingError, match="in the suite `prediction`"):
         prediction.TrueMap()._solid(None)
+
+
+def test_a_recipe_is_left_out_by_weights_that_the_training_command_wrote(tmp_path, monkeypatch):
+    """They are read where the docstring says, by the recipe of the mission; these are drawn."""
+    monkeypatch.chdir(tmp_path)
+    env = scripted_env(CORRIDOR, ending={"time_limit_s": 60.0})
+    with pytest.raises(SettingError, match="--leave-out corridor --out runs"):
+        SuiteMission()(env, prediction.LEFT_OUT, 3)
+    file = tmp_path / "runs" / "without-corridor" / "predictor.safetensors"
+    file.parent.mkdir(parents=True)
+    file.write_bytes(file_bytes(random_tensors()))
+    ends = [
+        SuiteMission()(env, name, 3)["entropy_end_bits"] for name in (prediction.LEFT_OUT, "planned-rate")
+    ]
+    assert ends[0] != ends[1]
 
 
 def test_missions_of_all_planners_differ():
