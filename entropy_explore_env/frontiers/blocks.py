@@ -245,13 +245,16 @@ def cell_at(size, x, y, z):
 @inlined_kernel
 def shares_face(blocks, marks, mask, value, x, y, z):
     """Return whether a cell's neighbour (of planar robots, in the layer) has a value in masked (N,) marks."""
-    size, found = blocks.size, False
-    for axis in range(2 if blocks.layer >= 0 else 3):
-        for step in (-1, 1):
-            near = cell_at(size, x + step * (axis == 0), y + step * (axis == 1), z + step * (axis == 2))
-            if near != NONE and marks[near] & mask == value:
-                found = True
-    return found
+    size, cell = blocks.size, flat_index(blocks.size, x, y, z)
+    row, column = size[2], size[1] * size[2]
+    return (
+        (x > 0 and marks[cell - column] & mask == value)
+        or (x < size[0] - 1 and marks[cell + column] & mask == value)
+        or (y > 0 and marks[cell - row] & mask == value)
+        or (y < size[1] - 1 and marks[cell + row] & mask == value)
+        or (blocks.layer < 0 and z > 0 and marks[cell - 1] & mask == value)
+        or (blocks.layer < 0 and z < size[2] - 1 and marks[cell + 1] & mask == value)
+    )
 
 
 @inlined_kernel
