@@ -10,9 +10,11 @@ from entropy_explore_env.belief.paths.string_pulling import Path, string_pull
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.planner.far_places import (
+    NOT_FREE,
     NOT_REACHED,
     BitCount,
     FoundPaths,
+    block_bounds,
     fill_blocks,
     place_of,
     promised_around,
@@ -22,7 +24,7 @@ from entropy_explore_env.planner.nearby import cost_of, evaluate, search_within
 from entropy_explore_env.planner.states import PlannerState
 from entropy_explore_env.planner.thresholds import FAR_PITCH_RAD, FIRST_RADIUS
 from entropy_explore_env.randomness import draw_gaussian, draw_uniform
-from entropy_explore_env.viewpoints.evaluation import indices_at, travel_seconds, voxel_at
+from entropy_explore_env.viewpoints.evaluation import STRAIGHTENED, indices_at, travel_seconds, voxel_at
 from entropy_explore_env.viewpoints.expected_scan import expected_bits
 
 _DEPLETED = int(PlannerState.DEPLETED)
@@ -67,25 +69,53 @@ def _insert(worths, options, at, worth, count):
 
 
 @lean_kernel
-def _fill_far(proposer, situation, state, options):
-    """Fill in the places of the blocks that promise most for the time, a few gazes each; return how many.
+def _least_seconds(proposer, situation, block, searched, at):
+    """Return the least seconds to a place in a block (i, j, k); `at` (5,) is overwritten.
+
+    They are those of a straight way, or of one longer than what was `searched`.
+    """
+    here, lattice, squared = situation.knowledge.pose, proposer.lattice, 0.0
+    low, high = block_bounds(proposer.blocks, situation.belief.size, block[0], block[1], block[2])
+    for axis in range(3):
+        apart = max(low[axis] - here[axis], here[axis] - high[axis], 0.0)
+        squared += apart * apart
+    standing_off = 2.0 * (lattice.edge - 1)  # a body may stand in another voxel of the same cell
+    copy_numbers(here, at)
+    at[0] += max(math.sqrt(squared) - standing_off, STRAIGHTENED * searched)
+    return travel_seconds(proposer.drive, proposer.exact.voxel_size_m, here, at, 0.0, proposer.reach)
+
+
+@lean_kernel
+def _fill_far(proposer, situation, state, searched, options):
+    """Fill in the places of the blocks that promise most for the time, a few gazes each.
 
     Openings that no gaze gets to promise much and bring nothing; where many are nearby, they would hide what
     is left in other places. So a DEPLETED planner weighs each place by chance.
+
+    Returns:
+        (count, beyond): how many viewpoints these are, and whether a place farther than what was `searched`
+        could be one of them.
     """
     scratch, blocks, recipe, drive = proposer.scratch, proposer.blocks, proposer.recipe, proposer.drive
     here, window, at = situation.knowledge.pose, blocks.window, scratch.at
     paths = FoundPaths(scratch.search, proposer.lattice, situation.costs)
     worths, gazes, edge_m = scratch.worth[: recipe.far_places], recipe.far_gazes, proposer.exact.voxel_size_m
-    rng, count = situation.experience.candidates_rng, 0
+    rng, count, beyond = situation.experience.candidates_rng, 0, 0.0
     for i in range(window[0, 0], window[0, 1]):
         for j in range(window[1, 0], window[1, 1]):
             for k in range(window[2, 0], window[2, 1]):
                 bits = promised_around(blocks, i, j, k)
                 if bits <= 0.0:
                     continue
+                if state != _DEPLETED and count == len(worths):
+                    least_s = _least_seconds(proposer, situation, (i, j, k), 0.0, at)
+                    if value_of(proposer, situation, bits, least_s) <= worths[count - 1]:
+                        continue
                 place = place_of(paths, blocks, i, j, k)
-                if place != NOT_REACHED:
+                if place == NOT_REACHED:
+                    least_s = _least_seconds(proposer, situation, (i, j, k), searched, at)
+                    beyond = max(beyond, value_of(proposer, situation, bits, least_s))
+                elif place != NOT_FREE:
                     _put_at(proposer, situation, place, at)
                     cost = cost_of(proposer, situation, at)
                     seconds = travel_seconds(drive, edge_m, here, at, cost, proposer.reach)
@@ -93,12 +123,46 @@ def _fill_far(proposer, situation, state, options):
                     if state == _DEPLETED:
                         worth *= draw_uniform(rng)
                     count = _insert(worths, options, at, worth, count)
+    could_be_beyond = beyond > 0.0 and (count < len(worths) or beyond > worths[count - 1])
     for place in range(count - 1, -1, -1):
         for gaze in range(gazes - 1, -1, -1):
             copy_numbers(options[place].viewpoint, options[place * gazes + gaze].viewpoint)
     for number in range(count * gazes):
         _draw_gaze(proposer, rng, options[number].viewpoint)
-    return count * gazes
+    return count * gazes, could_be_beyond
+
+
+@lean_kernel
+def _most_worth(proposer, situation, options):
+    """Bring those of some far viewpoints to the front that drawn rays find worth most; return how many."""
+    most = proposer.recipe.far_exact
+    if len(options) <= most:
+        return len(options)
+    evaluate(proposer, situation, proposer.drawn, options, True)
+    for place in range(most):
+        best = place
+        for other in range(place + 1, len(options)):
+            if options[other].value > options[best].value:
+                best = other
+        copy_numbers(options[best].viewpoint, proposer.scratch.at)
+        copy_numbers(options[place].viewpoint, options[best].viewpoint)
+        copy_numbers(proposer.scratch.at, options[place].viewpoint)
+        options[best].value = options[place].value
+    return most
+
+
+@lean_kernel
+def _evaluate_far(proposer, situation, count):
+    """Evaluate some far viewpoints, and the robot's goal as the last one; return (count, best value)."""
+    far, experience, best = proposer.scratch.far, situation.experience, 0.0
+    count = _most_worth(proposer, situation, far[:count])
+    if experience.going:
+        copy_numbers(experience.goal, far[count].viewpoint)
+        count += 1
+    evaluate(proposer, situation, proposer.exact, far[:count], True)
+    for number in range(count):
+        best = max(best, far[number].value)
+    return count, best
 
 
 @lean_kernel
@@ -106,7 +170,7 @@ def propose_far(proposer, situation, state):
     """Fill `scratch.far` with far viewpoints, evaluated; the nearer half of the world first.
 
     Paths are searched farther and farther until no place beyond could be worth more by one scan; between
-    cells of several voxels, which takes little time, everywhere in the second search. The goal to which the
+    cells of several voxels, which takes little time, until none could promise more. The goal to which the
     robot is on its way comes last, if there is one.
 
     Args:
@@ -117,27 +181,30 @@ def propose_far(proposer, situation, state):
     Returns:
         (count, value): how many there are, and what the best is worth.
     """
-    scratch, experience, belief = proposer.scratch, situation.experience, situation.belief
-    far, size, recipe = scratch.far, belief.size, proposer.recipe
-    start = voxel_at(size, situation.knowledge.pose)
+    experience, belief, far = situation.experience, situation.belief, proposer.scratch.far
+    size, start = belief.size, voxel_at(belief.size, situation.knowledge.pose)
     everywhere = float(size[0] + size[1] + size[2]) * proposer.unknown_cost
-    radius = FIRST_RADIUS * proposer.within
-    count_of = BitCount(proposer.target_precision, proposer.exact.known_precision, recipe.behind)
+    radius = min(FIRST_RADIUS * proposer.within, everywhere)
+    count_of = BitCount(proposer.target_precision, proposer.exact.known_precision, proposer.recipe.behind)
+    if proposer.lattice.edge > 1:
+        radius = everywhere if state == _DEPLETED else radius
+        fill_blocks(belief, count_of, start, math.ceil(everywhere), proposer.blocks)
+        while True:
+            search_within(proposer, situation, radius)
+            count, beyond = _fill_far(proposer, situation, state, radius, far)
+            lost = experience.going and cost_of(proposer, situation, experience.goal) > radius
+            if radius >= everywhere or not (beyond or lost):
+                return _evaluate_far(proposer, situation, count)
+            radius = min(1.5 * radius, everywhere)
     while True:
-        radius = min(radius, everywhere)
         search_within(proposer, situation, radius)
         fill_blocks(belief, count_of, start, math.ceil(radius), proposer.blocks)
-        count, best = _fill_far(proposer, situation, state, far), 0.0
-        if experience.going:
-            copy_numbers(experience.goal, far[count].viewpoint)
-            count += 1
-        evaluate(proposer, situation, proposer.exact, far[:count], True)
-        for number in range(count):
-            best = max(best, far[number].value)
+        count, _ = _fill_far(proposer, situation, state, radius, far)
+        count, best = _evaluate_far(proposer, situation, count)
         seconds = max(radius * proposer.exact.voxel_size_m / proposer.drive.max_speed_m_s, 1e-9)
         if radius >= everywhere or best >= value_of(proposer, situation, experience.most_bits, seconds):
             return count, best
-        radius = 2.0 * radius if proposer.lattice.edge == 1 else everywhere
+        radius = min(2.0 * radius, everywhere)
 
 
 @lean_kernel

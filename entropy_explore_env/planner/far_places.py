@@ -21,8 +21,8 @@ from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
-NOT_REACHED = -1
-"""As a place: no voxel of the block that is known to be free was reached."""
+NOT_REACHED, NOT_FREE = -1, -2
+"""As a place: no voxel of the block that is known to be free was reached; none is known to be free."""
 _FOLD_ABOVE = 1e250
 """A product is folded into bits before it could leave a float64."""
 
@@ -87,7 +87,7 @@ def _is_opening(free, size, voxel, x, y, z):
 
 
 @inlined_kernel
-def _bounds(blocks, size, i, j, k):
+def block_bounds(blocks, size, i, j, k):
     """Return (low, high) of a block: its voxels are those from `low` up to, not including, `high`."""
     edge = blocks.edge
     low = (i * edge, j * edge, k * edge)
@@ -131,15 +131,15 @@ def fill_blocks(belief, count, start, radius, blocks):
     for axis in range(3):
         window[axis, 0] = max((centre[axis] - radius) // blocks.edge, 0)
         window[axis, 1] = min((centre[axis] + radius) // blocks.edge + 1, blocks.bits.shape[axis])
-    low = _bounds(blocks, belief.size, window[0, 0] - 1, window[1, 0] - 1, window[2, 0] - 1)[0]
-    high = _bounds(blocks, belief.size, window[0, 1], window[1, 1], window[2, 1])[1]
+    low = block_bounds(blocks, belief.size, window[0, 0] - 1, window[1, 0] - 1, window[2, 0] - 1)[0]
+    high = block_bounds(blocks, belief.size, window[0, 1], window[1, 1], window[2, 1])[1]
     low = max(low[0], 0), max(low[1], 0), max(low[2], 0)
     _mark_free(belief, count.known_precision, low, high, blocks.free)
     blocks.bits[:], blocks.promised[:] = 0.0, 0.0
     for i in range(window[0, 0], window[0, 1]):
         for j in range(window[1, 0], window[1, 1]):
             for k in range(window[2, 0], window[2, 1]):
-                low, high = _bounds(blocks, belief.size, i, j, k)
+                low, high = block_bounds(blocks, belief.size, i, j, k)
                 blocks.bits[i, j, k], blocks.promised[i, j, k] = _count_bits(
                     belief, count, blocks.free, low, high
                 )
@@ -147,7 +147,7 @@ def fill_blocks(belief, count, start, radius, blocks):
 
 @lean_kernel
 def place_of(paths, blocks, i, j, k):
-    """Return the voxel from which a block is looked at: see the top of this file; NOT_REACHED = none.
+    """Return the voxel from which a block is looked at: see the top of this file; below 0 = none.
 
     Where paths are searched in cells of several voxels, it is the voxel in which the body stands in the cell
     of the nearest one, if that is known to be free, too.
@@ -160,8 +160,8 @@ def place_of(paths, blocks, i, j, k):
         k: Along z.
     """
     size, layer, edge = paths.lattice.grid, paths.lattice.layer, paths.lattice.edge
-    low, high = _bounds(blocks, size, i, j, k)
-    place, nearest = NOT_REACHED, math.inf
+    low, high = block_bounds(blocks, size, i, j, k)
+    place, nearest = NOT_FREE, math.inf
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
             level = (2 * x + 1 - low[0] - high[0]) ** 2 + (2 * y + 1 - low[1] - high[1]) ** 2
@@ -172,6 +172,7 @@ def place_of(paths, blocks, i, j, k):
                 voxel = flat_index(size, x, y, z)
                 if away >= nearest or not blocks.free[voxel] or (layer >= 0 and z != layer):
                     continue
+                place = max(place, NOT_REACHED)
                 if math.isinf(cost_to(paths.search, cell_of(paths.lattice, (x, y, z)))):
                     continue
                 if edge > 1:

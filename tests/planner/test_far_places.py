@@ -13,6 +13,7 @@ from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
 from entropy_explore_env.belief.paths.search import cost_to, new_search
 from entropy_explore_env.planner.far_places import (
+    NOT_FREE,
     NOT_REACHED,
     BitCount,
     FoundPaths,
@@ -62,7 +63,7 @@ def test_blocks_are_those_of_a_slow_count(seed, layer):
         low = np.array(index) * EDGE
         high = np.minimum(low + EDGE, SIZE)
         outside = (low > np.array((3, 5, 3)) + radius).any() or (high <= np.array((3, 5, 3)) - radius).any()
-        bits, promised, reached = 0.0, 0.0, {}
+        bits, promised, reached, none = 0.0, 0.0, {}, NOT_FREE
         for voxel in itertools.product(*(range(a, b) for a, b in zip(low, high, strict=True))):
             if mean[voxel] <= 0.5:
                 left = max(0.5 * math.log2(TARGET / float(precision[voxel])), 0.0)
@@ -73,7 +74,9 @@ def test_blocks_are_those_of_a_slow_count(seed, layer):
                 elif lies_beside_free(mean, precision, seen, voxel):
                     promised += BEHIND * left
                 number = int(np.ravel_multi_index(voxel, SIZE))
-                if known and (layer < 0 or voxel[2] == layer) and math.isfinite(cost_to(search, number)):
+                free = known and (layer < 0 or voxel[2] == layer)
+                none = NOT_REACHED if free else none
+                if free and math.isfinite(cost_to(search, number)):
                     reached[number] = float(((np.array(voxel) + 0.5 - (low + high) / 2) ** 2).sum())
         within = zip(index, blocks.window, strict=True)
         assert outside != all(first <= number < last for number, (first, last) in within)
@@ -82,8 +85,8 @@ def test_blocks_are_those_of_a_slow_count(seed, layer):
         assert blocks.bits[index] == pytest.approx(bits, rel=1e-6, abs=1e-9)
         assert blocks.promised[index] == pytest.approx(promised, rel=1e-6, abs=1e-9)
         both += int(0.0 < promised < bits)
-        place = place_of(paths, blocks, *index) if not outside else NOT_REACHED
-        assert (place == NOT_REACHED) == (not reached)
+        place = place_of(paths, blocks, *index) if not outside else none
+        assert reached or place == none
         places += bool(reached)
         if reached:
             assert reached[place] == min(reached.values())
@@ -128,11 +131,12 @@ def test_places_in_cells_are_where_a_body_stands_on_known_ground(seed):
     fits = World(Grid(shape, 1.0), mean > 0.5, "drawn").collision_mask(radius) == 0
     free, places = (mean <= 0.5) & (precision >= 1.0), 0
     for index in itertools.product(*map(range, blocks.bits.shape)):
-        stands = set()
+        stands, none = set(), NOT_FREE
         for voxel in itertools.product(
             *(range(4 * n, min(4 * n + 4, m)) for n, m in zip(index, shape, strict=True))
         ):
             cell = tuple(n // edge for n in voxel)
+            none = NOT_REACHED if free[voxel] else none
             if free[voxel] and math.isfinite(cost_to(search, int(np.ravel_multi_index(cell, lattice.size)))):
                 inside = itertools.product(
                     *(range(edge * n, min(edge * n + edge, m)) for n, m in zip(cell, shape, strict=True))
@@ -141,6 +145,6 @@ def test_places_in_cells_are_where_a_body_stands_on_known_ground(seed):
                 if free[stand]:
                     stands.add(int(np.ravel_multi_index(stand, shape)))
         place = place_of(paths, blocks, *index)
-        assert place in stands if stands else place == NOT_REACHED
+        assert place in stands if stands else place == none
         places += bool(stands)
     assert 3 <= places < blocks.bits.size

@@ -10,10 +10,10 @@ import pytest
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import belief_costs
 from entropy_explore_env.belief.visibility import CONE
-from entropy_explore_env.planner.far import first_stop, propose_far
+from entropy_explore_env.planner.far import _fill_far, first_stop, propose_far
 from entropy_explore_env.planner.memory import trust_and_clearance, worth_bits
 from entropy_explore_env.planner.model import Situation, new_proposers
-from entropy_explore_env.planner.nearby import cost_of, evaluate, propose_nearby, start_paths
+from entropy_explore_env.planner.nearby import cost_of, evaluate, propose_nearby, search_within, start_paths
 from entropy_explore_env.planner.propose import choose
 from entropy_explore_env.planner.recipe import ALL_AROUND, NARROW_PLANNED, NARROW_STRAIGHT
 from entropy_explore_env.planner.records import EXPERIENCE, KNOWLEDGE, MATE, Kind
@@ -31,6 +31,15 @@ PLAN = with_settings(
         "grid": Grid((50, 70, 1), 0.1),
         "robots": 1,
         "robot": {"body_radius_m": 0.0, "reach_m": 1.5},
+        "action": ACTION,
+    },
+)
+HALL = with_settings(
+    OFFICE_3D,
+    {
+        "grid": Grid((170, 30, 20), 0.1),
+        "robots": 1,
+        "robot": {"navigator": "planned", "body_radius_m": 0.3, "reach_m": 4.2},
         "action": ACTION,
     },
 )
@@ -164,6 +173,42 @@ def test_a_depleted_planner_evaluates_other_places_each_time():
     assert propose_far(proposer, situation, EXPLORING) == (2, 0.0)
     depleted = [propose_far(proposer, situation, int(PlannerState.DEPLETED)) for _ in range(8)]
     assert max(best for _, best in depleted) > 0.0
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_between_cells_the_search_ends_where_no_place_beyond_could_promise_more(seed):
+    """A search everywhere finds none that promises more, in a hall that is known but for gaps."""
+    recipe = ALL_AROUND._replace(far_places=3)
+    proposer, shape, rng = new_proposers(HALL, recipe)[0], HALL.grid.shape, np.random.default_rng(seed)
+    precision = np.where(rng.random(shape) < 0.002, UNKNOWN, 2000.0)
+    begin = 60 if seed < 4 else 140
+    precision[begin : begin + rng.integers(10, 30), :8] = UNKNOWN
+    here, far_end = (np.array([x, 15.5, 10.5, 0.3, 0.0]) for x in (6.5, 164.5))
+    situation = situation_of(HALL, np.zeros(shape), precision, here, most_bits=1e9)
+    scratch = proposer.scratch
+    assert proposer.lattice.edge == 2
+    start_paths(proposer, situation)
+    assert propose_far(proposer, situation, EXPLORING)[0] == 3
+    staged, whole = scratch.worth[:3].copy(), cost_of(proposer, situation, far_end) < math.inf
+    assert whole == (seed >= 4)
+    search_within(proposer, situation, math.inf)
+    assert _fill_far(proposer, situation, EXPLORING, math.inf, scratch.far) == (3, False)
+    assert (staged >= scratch.worth[:3] * (1.0 - 1e-9)).all()
+
+
+def test_of_far_places_those_that_drawn_rays_find_worth_most_are_evaluated_with_all():
+    values = {}
+    for far_exact in (2, 1000):
+        recipe = ALL_AROUND._replace(draw_thinning=2, far_exact=far_exact)
+        proposer, situation = new_proposers(PLAN, recipe)[0], half_known_plan(most_bits=1e9)
+        start_paths(proposer, situation)
+        count, best = propose_far(proposer, situation, EXPLORING)
+        far = proposer.scratch.far[:count].copy()
+        assert best == far["value"].max() and count == min(far_exact, count)
+        values[far_exact] = {tuple(each["viewpoint"]): each["value"] for each in far}
+    assert len(values[2]) == 2 < len(values[1000]) and values[2].items() <= values[1000].items()
+    ranked = sorted(values[1000].values())
+    assert max(values[2].values()) >= ranked[-3]
 
 
 def test_the_first_stop_on_the_way_is_within_reach_and_free(far):
