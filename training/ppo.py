@@ -12,6 +12,10 @@ missions × robots of them. `training/advantages.py` says what is learned while 
 
 from __future__ import annotations
 
+from training import extra  # noqa: F401 - before what is not there without it
+
+# isort: split
+
 import dataclasses
 import shlex
 import sys
@@ -47,7 +51,6 @@ from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.validation import check_whole
 from entropy_explore_env.writing import write_atomically
-from training import extra  # noqa: F401 - before what is not there without it
 from training.advantages import DecisionBuffer, Normaliser
 from training.candidate_network import (
     ATTENTION_LAYERS,

@@ -77,7 +77,7 @@ def read_table(table: Path) -> list[Row]:
     try:
         content = table.read_bytes()
         text = (lzma.decompress(content) if table.suffix == ".xz" else content).decode(errors="replace")
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         return []
     except (OSError, lzma.LZMAError) as error:
         raise SettingError("table", str(table), f"a file of rows that can be read ({error})") from None

@@ -71,6 +71,7 @@ def test_tables_that_cannot_be_read_or_grown(tmp_path):
         read_table(tmp_path / "t.jsonl.xz")
     with pytest.raises(SettingError, match="not compressed"), GrowingTable(tmp_path / "t.jsonl.xz").opened():
         pass
+    assert read_table(tmp_path / "t.jsonl.xz" / "below.jsonl") == []  # as where no file is
     table = GrowingTable(tmp_path / "t.jsonl")
     with table.opened(), pytest.raises(SettingError, match="no other command"), table.opened():
         pass
