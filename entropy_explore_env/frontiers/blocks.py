@@ -1,10 +1,9 @@
-"""States of the cells of one robot's map, where its mapped space ends, and one candidate for each block.
+"""Where the mapped space of one robot ends, and one candidate for each block of cells.
 
-A cell is a voxel, or a column of ground. A voxel is explored once its σ has fallen to a stated level. The
-edge (Yamauchi 1998) consists of mapped free cells next to unexplored ones; at a finer level also of mapped
-cells that are unexplored themselves. A candidate is a cell that has room and whose footprint meets the edge;
-the one nearest to the middle of its block represents the block. Cells are known by number, C order; lengths
-are in cells. `blocks` is always a Blocks.
+A cell is a voxel, or a column of ground, in one of `voxel_states`. The edge (Yamauchi 1998) consists of mapped
+free cells next to unexplored ones; at a finer level also of mapped cells that are unexplored themselves. A
+candidate is a cell that has room and whose footprint meets the edge; the one nearest to the middle of its
+block represents it. Cells are known by number, C order; lengths are in cells. `blocks` is always a Blocks.
 """
 
 from __future__ import annotations
@@ -14,16 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.raycast import STOP_AT_COVERED
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-
-UNEXPLORED = 1
-"""σ is above the level that counts as explored now."""
-UNMAPPED = 2
-"""σ is above the first such level: no place to drive through."""
-COVERED = 4
-"""Believed covered: it stops rays and bodies."""
+from entropy_explore_env.frontiers.voxel_states import COVERED, UNEXPLORED, UNMAPPED
 
 EDGE = 1
 """Mapped and free, and itself unexplored at the level that counts now, or beside such a cell."""
@@ -42,82 +34,6 @@ _ALL_FLAGS = 127
 NONE = -1
 """In place of the number of a cell or voxel: there is none."""
 _NO_COSTS = np.zeros(0)
-_TOGETHER = 128
-"""Voxels that are compared together, without branches, before single ones are."""
-
-
-class VoxelStates(NamedTuple):
-    """States of V voxels."""
-
-    state: np.ndarray
-    """(V,) uint8: UNEXPLORED, UNMAPPED, COVERED."""
-    changed: np.ndarray
-    """(N,) int32, the voxels that changed in the latest update come first: N is the most in one update."""
-    opened: np.ndarray
-    """(V + X·Y,) int32, the first `opened_count` are voxels past which more may be visible than before."""
-    opened_count: np.ndarray
-    """(1,) int64; set to 0 by the reader."""
-    size: tuple[int, int, int]
-
-
-def new_states(shape: tuple[int, int, int], at_once: int) -> VoxelStates:
-    """Return the states of (X, Y, Z) voxels of which nothing is explored; `at_once` are updated at once."""
-    voxels = math.prod(shape)
-    return VoxelStates(
-        state=np.full(voxels, UNEXPLORED | UNMAPPED, np.uint8),
-        changed=np.zeros(min(voxels, at_once), np.int32),
-        opened=np.zeros(voxels + shape[0] * shape[1], np.int32),
-        opened_count=np.zeros(1, np.int64),
-        size=(int(shape[0]), int(shape[1]), int(shape[2])),
-    )
-
-
-@inlined_kernel
-def _state_of(mean, precision, levels):
-    """Return the state of a voxel without branches: for many voxels at once."""
-    unexplored, unmapped = np.uint8(precision < levels[0]), np.uint8(precision < levels[1])
-    covered = np.uint8(mean > np.float32(STOP_AT_COVERED)) & ~unmapped
-    return np.uint8(unexplored * UNEXPLORED | unmapped * UNMAPPED | covered * COVERED)
-
-
-@inlined_kernel
-def note_opened(states, voxel):
-    """Note that more may be visible past a voxel than before."""
-    states.opened[states.opened_count[0]] = voxel
-    states.opened_count[0] += 1
-
-
-@lean_kernel
-def update_states(states, mean, precision, levels, begin, end):
-    """Bring the states of the voxels from `begin` up to but without `end` up to date with a belief.
-
-    Args:
-        states: Of the robot.
-        mean: (V,) float32.
-        precision: (V,) float32 1/σ² > 0.
-        levels: (explored, mapped): precisions from which on a voxel is explored, and mapped.
-        begin: Number of the first voxel.
-        end: One past the last; there are no more than `states.changed` holds.
-
-    Returns:
-        How many of them are in another state than at the latest update.
-    """
-    state, count = states.state, 0
-    for first in range(begin, end, _TOGETHER):
-        last, different = min(first + _TOGETHER, end), np.uint8(0)
-        for voxel in range(first, last):
-            different |= state[voxel] ^ _state_of(mean[voxel], precision[voxel], levels)
-        if different == 0:
-            continue
-        for voxel in range(first, last):
-            before, now = state[voxel], _state_of(mean[voxel], precision[voxel], levels)
-            if now != before:
-                state[voxel] = now
-                states.changed[count] = voxel
-                count += 1
-                if before & COVERED > now & COVERED or before & UNEXPLORED < now & UNEXPLORED:
-                    note_opened(states, voxel)
-    return count
 
 
 class Blocks(NamedTuple):
@@ -353,13 +269,6 @@ def _meets_edge(blocks, x, y, z):
     return False
 
 
-@inlined_kernel
-def _from_middle(low, high, x, y, z):
-    """Return the squared distance of a cell from the middle of its block, in half cells."""
-    dx, dy, dz = 2 * x + 1 - low[0] - high[0], 2 * y + 1 - low[1] - high[1], 2 * z + 1 - low[2] - high[2]
-    return dx * dx + dy * dy + dz * dz
-
-
 @lean_kernel
 def _nearest_to_middle(blocks, block, cost):
     """Return the CANDIDATE cell nearest to the middle of its block to which a path leads; NONE = none.
@@ -367,13 +276,15 @@ def _nearest_to_middle(blocks, block, cost):
     (N,) float64 path costs are inf where no path leads; with (0,) paths do not matter.
     """
     low, high = block_span(blocks, block)
+    middle = (low[0] + high[0], low[1] + high[1], low[2] + high[2])
     best, nearest = NONE, math.inf
     for x in range(low[0], high[0]):
         for y in range(low[1], high[1]):
             for z in range(low[2], high[2]):
                 cell = flat_index(blocks.size, x, y, z)
                 if blocks.flags[cell] & CANDIDATE and (len(cost) == 0 or not math.isinf(cost[cell])):
-                    apart = _from_middle(low, high, x, y, z)
+                    dx, dy, dz = 2 * x + 1 - middle[0], 2 * y + 1 - middle[1], 2 * z + 1 - middle[2]
+                    apart = dx * dx + dy * dy + dz * dz
                     if apart < nearest:
                         best, nearest = cell, apart
     return best

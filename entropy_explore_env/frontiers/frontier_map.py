@@ -14,8 +14,9 @@ from typing import Literal
 
 import numpy as np
 
-from entropy_explore_env.frontiers.blocks import EXCLUDED, NONE, UNMAPPED, Blocks, VoxelStates, mark_around
+from entropy_explore_env.frontiers.blocks import EXCLUDED, NONE, Blocks, mark_around
 from entropy_explore_env.frontiers.visibility import VisibilityCounter, forget_in_range, new_counter
+from entropy_explore_env.frontiers.voxel_states import UNMAPPED, VoxelStates
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario

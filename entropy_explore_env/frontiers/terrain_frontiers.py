@@ -19,23 +19,16 @@ from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.frontiers.blocks import (
     CANDIDATE,
-    COVERED,
     NONE,
     ROOM,
-    UNEXPLORED,
-    UNMAPPED,
     Blocks,
-    VoxelStates,
     block_span,
     choose_candidate,
     mark_around,
     mark_edges,
     new_blocks,
-    new_states,
-    note_opened,
     replace_unreached,
     set_flag,
-    update_states,
 )
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig, FrontierMap
 from entropy_explore_env.frontiers.terrain_visibility import (
@@ -48,6 +41,15 @@ from entropy_explore_env.frontiers.terrain_visibility import (
 )
 from entropy_explore_env.frontiers.visibility import yaws_around
 from entropy_explore_env.frontiers.voxel_map import body_footprint
+from entropy_explore_env.frontiers.voxel_states import (
+    COVERED,
+    UNEXPLORED,
+    UNMAPPED,
+    VoxelStates,
+    new_states,
+    note_opened,
+    update_states,
+)
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario

@@ -18,8 +18,9 @@ import numpy as np
 
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.frontiers.blocks import NONE, UNEXPLORED
+from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.frontiers.visibility import count_point, start_count
+from entropy_explore_env.frontiers.voxel_states import UNEXPLORED
 
 
 class ViewModel(NamedTuple):

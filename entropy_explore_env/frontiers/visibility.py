@@ -28,7 +28,7 @@ from entropy_explore_env.belief.raycast import (
 )
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
-from entropy_explore_env.frontiers.blocks import UNEXPLORED
+from entropy_explore_env.frontiers.voxel_states import UNEXPLORED
 from entropy_explore_env.robots.rotations import directions_of
 from entropy_explore_env.settings.robot_kind import RobotKind
 

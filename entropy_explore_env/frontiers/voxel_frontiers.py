@@ -16,14 +16,11 @@ import numpy as np
 
 from entropy_explore_env.frontiers.blocks import (
     CANDIDATE,
-    COVERED,
     DROPPED,
     EDGE,
     EXCLUDED,
     NONE,
-    UNMAPPED,
     new_blocks,
-    new_states,
     replace_unreached,
 )
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig, FrontierMap
@@ -47,6 +44,7 @@ from entropy_explore_env.frontiers.voxel_map import (
     update_voxels,
     voxels_around,
 )
+from entropy_explore_env.frontiers.voxel_states import COVERED, UNMAPPED, new_states
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario

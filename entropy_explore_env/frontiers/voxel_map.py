@@ -18,14 +18,11 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.frontiers.blocks import (
     CANDIDATE,
     COUNTED_FREE,
-    COVERED,
     DROPPED,
     EDGE,
     EXCLUDED,
     NONE,
     ROOM,
-    UNEXPLORED,
-    UNMAPPED,
     block_span,
     cell_at,
     choose_candidate,
@@ -34,8 +31,8 @@ from entropy_explore_env.frontiers.blocks import (
     mark_edges,
     set_flag,
     shares_face,
-    update_states,
 )
+from entropy_explore_env.frontiers.voxel_states import COVERED, UNEXPLORED, UNMAPPED, update_states
 
 _KNOWN_FREE = 1
 """States above this are unmapped or covered."""

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.frontiers.blocks import COVERED, UNEXPLORED
 from entropy_explore_env.frontiers.visibility import (
     count_crossed,
     count_from,
@@ -19,6 +18,7 @@ from entropy_explore_env.frontiers.visibility import (
     rays_around,
     rays_towards,
 )
+from entropy_explore_env.frontiers.voxel_states import COVERED, UNEXPLORED
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 

@@ -9,18 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from entropy_explore_env.frontiers.blocks import (
-    CANDIDATE,
-    COVERED,
-    DROPPED,
-    NONE,
-    UNEXPLORED,
-    UNMAPPED,
-    mark_around,
-    new_blocks,
-    new_states,
-)
+from entropy_explore_env.frontiers.blocks import CANDIDATE, DROPPED, NONE, mark_around, new_blocks
 from entropy_explore_env.frontiers.voxel_map import AT_ONCE, body_footprint, update_voxels
+from entropy_explore_env.frontiers.voxel_states import COVERED, UNEXPLORED, UNMAPPED, new_states
 from tests.reference import sawhney as reference
 from tests.reference.scenes import drawn, seeds
 

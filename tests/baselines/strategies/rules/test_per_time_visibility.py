@@ -14,10 +14,10 @@ from baselines.strategies.allocation import ExplorationConfig
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.frontiers.blocks import COVERED
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig, FrontierMap
 from entropy_explore_env.frontiers.terrain_frontiers import TerrainFrontiers
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
+from entropy_explore_env.frontiers.voxel_states import COVERED
 from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
