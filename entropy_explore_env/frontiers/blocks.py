@@ -1,6 +1,6 @@
 """Where the mapped space of one robot ends, and one candidate for each block of cells.
 
-A cell is a voxel, or a column of ground, in one of `voxel_states`. The edge (Yamauchi 1998) consists of mapped
+A cell is a voxel or a column of ground, in one of `voxel_states`. The edge (Yamauchi 1998) consists of mapped
 free cells next to unexplored ones; at a finer level also of mapped cells that are unexplored themselves. A
 candidate is a cell that has room and whose footprint meets the edge; the one nearest to the middle of its
 block represents it. Cells are known by number, C order; lengths are in cells. `blocks` is always a Blocks.
