@@ -9,7 +9,7 @@ Letters: S tasks, N missions of each, B resamples.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,17 +67,19 @@ def central_range(values: Sample) -> Range:
 
 def ratio_interval(numerator: Sample, denominator: Sample) -> Interval:
     """Return the ratio of two means over the same seeds, and its interval (paired bootstrap)."""
-    pairs = np.stack([np.asarray(numerator, float), np.asarray(denominator, float)], axis=1)
-    means = _resampled(pairs, len(pairs)).mean(axis=1)
-    return Interval(float(pairs[:, 0].mean() / pairs[:, 1].mean()), *_central(means[:, 0] / means[:, 1]))
+    return _ratio_of(np.mean, numerator, denominator)
 
 
 def median_ratio_interval(numerator: Sample, denominator: Sample) -> Interval:
     """Return the ratio of two medians over the same seeds, and its interval (paired bootstrap)."""
+    return _ratio_of(np.median, numerator, denominator)
+
+
+def _ratio_of(statistic: Callable[..., Any], numerator: Sample, denominator: Sample) -> Interval:
     pairs = np.stack([np.asarray(numerator, float), np.asarray(denominator, float)], axis=1)
-    medians = np.median(_resampled(pairs, len(pairs)), axis=1)
-    ratio = float(np.median(pairs[:, 0]) / np.median(pairs[:, 1]))
-    return Interval(ratio, *_central(medians[:, 0] / medians[:, 1]))
+    drawn = statistic(_resampled(pairs, len(pairs)), axis=1)
+    ratio = float(statistic(pairs[:, 0]) / statistic(pairs[:, 1]))
+    return Interval(ratio, *_central(drawn[:, 0] / drawn[:, 1]))
 
 
 def geometric_ratio_interval(ours: Sequence[Sample], theirs: Sequence[Sample]) -> Interval:

@@ -220,14 +220,6 @@ def coverage_table(records: Records) -> str:
 
 def exploration_table(records: Records) -> str:
     """Return a table of (b)."""
-    points = [
-        (name, variant, range_cells)
-        for name, floor in FLOORS.items()
-        for variant, range_cells in (
-            *(("paper", r) for r in floor.ranges),
-            *((variant, floor.middle) for variant in floor.variants),
-        )
-    ]
 
     def converged(cell: str) -> str:
         return f"{sum(each['ended'] == 'converged' for each in records[cell])} of {len(records[cell])}"
@@ -238,7 +230,8 @@ def exploration_table(records: Records) -> str:
 
     rows = [
         ((floor, variant, f"{range_cells:g}"), cell)
-        for floor, variant, range_cells in points
+        for floor, plan in FLOORS.items()
+        for variant, range_cells in plan.points
         if (cell := exploration_id(floor, variant, range_cells)) in records
     ]
     columns = {"converged": converged, "all explored at (median)": explored}

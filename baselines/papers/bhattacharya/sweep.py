@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -74,6 +75,12 @@ class Floor:
     ranges: tuple[float, ...]
     variants: tuple[str, ...]
 
+    @property
+    def points(self) -> list[tuple[str, float]]:
+        """(variant, sensor range) of the runs there."""
+        paper = [("paper", range_cells) for range_cells in self.ranges]
+        return paper + [(variant, self.middle) for variant in self.variants]
+
 
 FLOORS = {
     "wide": Floor((1000, 783), 0.1 / 3.0, 25_000, 2750, 100.0, (100.0,), ()),
@@ -122,7 +129,8 @@ def experiment(amount: Amount) -> list[Trial]:
     small = max(1, amount.seeds // (5 if amount.quick else 2))
     runs = all_runs(amount.seeds, 0 if amount.quick else 1, small)
     missions = trials_of(channel_cells(4 * max(1, amount.seeds // 4)))
-    return [*runs, Measured(max((run for run in runs if not run.known), key=size_of)), *missions]
+    largest = max((run for run in runs if not run.known), key=lambda run: math.prod(run.shape))
+    return [*runs, Measured(largest), *missions]
 
 
 def all_runs(coverage_seeds: int, plans: int, small_plans: int) -> list[Run]:
@@ -144,16 +152,9 @@ def all_runs(coverage_seeds: int, plans: int, small_plans: int) -> list[Run]:
         for seed in range(coverage_seeds)
     ]
     for name, floor in FLOORS.items():
-        points = [("paper", range_cells) for range_cells in floor.ranges]
-        points += [(variant, floor.middle) for variant in floor.variants]
         seeds = range(small_plans if name == "small" else plans)
-        runs += [_exploration(name, *point, seed) for seed, point in product(seeds, points)]
+        runs += [_exploration(name, *point, seed) for seed, point in product(seeds, floor.points)]
     return runs
-
-
-def size_of(run: Run) -> int:
-    """Return how many cells the plan of a run has."""
-    return run.shape[0] * run.shape[1]
 
 
 def _exploration(floor: str, variant: str, range_cells: float, seed: int) -> Run:

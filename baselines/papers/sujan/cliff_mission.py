@@ -10,8 +10,8 @@ from baselines.experiments.experiment import Records
 from baselines.experiments.mission import run_mission
 from baselines.experiments.rows import Record
 from baselines.strategies import make_strategy
+from baselines.strategies.next_best_view.ground_map import measured
 from baselines.strategies.next_best_view.plateau_rule import PlateauRule
-from entropy_explore_env.belief.elevation import elevation_map
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.reports.metrics import mission_figures
@@ -98,11 +98,7 @@ def record_mapping(env: EntropyExploreEnv, strategy: str, seed: int) -> Record:
 
 def known_columns(env: EntropyExploreEnv) -> np.ndarray:
     """Return (X, Y) bool, columns of the elevation map of the only rover that are known."""
-    view = view_of(env.missions, 0, 0)
-    scenario = view.scenario
-    sigma_min = view.kind.sensor.sigma_min
-    found = elevation_map(view.mean, view.precision, scenario.grid, scenario.sigma_prior, sigma_min)
-    return found.known
+    return measured(view_of(env.missions, 0, 0)).known
 
 
 def plateau_of(occupied: np.ndarray) -> np.ndarray:

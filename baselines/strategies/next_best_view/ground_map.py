@@ -71,7 +71,7 @@ class GroundMap:
         """Begin where a rover stands."""
         self.traversal_cost = np.full(view.scenario.grid.voxels, np.float32(np.inf))
         shape = view.scenario.grid.shape[:2]
-        self.known = _measured(view)
+        self.known = measured(view)
         self.interest = np.ones(shape)
         self.looks: list[Look] = []
         self._stood = np.zeros(shape, bool)
@@ -92,7 +92,7 @@ class GroundMap:
             form: How the edge of its plateau is taken, behind which it stays; None = only what carries it
                 counts.
         """
-        before, self.known = self.known, _measured(view)
+        before, self.known = self.known, measured(view)
         self._stand(view)
         carrying = self.known.known | self._stood
         self._window = window = window_in_reach(carrying, camera_of(view).reach)
@@ -179,7 +179,7 @@ class GroundMap:
         beside |= gaps[0] ** 2 + gaps[1] ** 2 < radius**2
 
 
-def _measured(view: RobotKnowledge) -> ElevationMap:
+def measured(view: RobotKnowledge) -> ElevationMap:
     """Return the elevation map of a rover's belief."""
     scenario = view.scenario
     sigma_min = view.kind.sensor.sigma_min
