@@ -131,7 +131,6 @@ def test_paths_begin_at_home(monkeypatch, tmp_path):
         ("--radius-m 3", "did you mean --body.wheel.radius-m?"),
         ("--body.light", "did you mean --body.lights?"),
         ("--what-else 3", "--what-else: no such option; see --help"),
-        ("--name office", "--name: no such option; its value stands alone: "),
         ("office stray", "stray: expected an option"),
         ("--body.turns lef", "expected one of left, right; did you mean left?, or a number"),
         ("--body.places-m 1 2 3", "--body.places-m: expected 2 numbers each"),

@@ -46,18 +46,13 @@ def bootstrapped(statistic, *samples: np.ndarray) -> tuple[float, float]:
     return float(interval.low), float(interval.high)
 
 
-def test_the_interval_of_a_mean_is_scipy_s():
-    mean, *interval = mean_interval(SAMPLE.tolist())
-    assert mean == pytest.approx(SAMPLE.mean())
-    assert_alike((interval[0], interval[1]), bootstrapped(np.mean, SAMPLE))
-    spread = 1.96 * SAMPLE.std() / math.sqrt(40)
-    assert_alike((interval[0], interval[1]), (mean - spread, mean + spread), 0.1)
-
-
-def test_the_interval_of_a_median_is_scipy_s():
-    median, *interval = median_interval(SAMPLE)
-    assert median == pytest.approx(np.median(SAMPLE))
-    assert_alike((interval[0], interval[1]), bootstrapped(np.median, SAMPLE), 0.1)
+@pytest.mark.parametrize(
+    ("interval_of", "statistic", "share"), [(mean_interval, np.mean, 0.06), (median_interval, np.median, 0.1)]
+)
+def test_the_interval_of_a_mean_and_of_a_median_is_scipy_s(interval_of, statistic, share):
+    value, low, high = interval_of(SAMPLE.tolist())
+    assert value == pytest.approx(statistic(SAMPLE))
+    assert_alike((low, high), bootstrapped(statistic, SAMPLE), share)
 
 
 def test_the_interval_of_a_ratio_is_scipy_s_paired():

@@ -123,11 +123,6 @@ def close_starts(world: World, robots: int, rng: np.random.Generator) -> np.ndar
     return starts
 
 
-def longest_stand_s(kind: str, strategy: str | Callable[[], Strategy], robots: int, seed: int) -> float:
-    """The longest time that a robot neither moves nor gains anything, in a maze with close starts."""
-    return stand_of(kind, strategy, robots, seed).robot_s
-
-
 def stand_of(
     kind: str, strategy: str | Callable[[], Strategy], robots: int, seed: int, **changes: object
 ) -> Stand:
@@ -175,7 +170,7 @@ def stand_of(
 @pytest.mark.parametrize("strategy", STRATEGIES)
 def test_robots_that_start_close_to_each_other_keep_moving(strategy, kind):
     for robots in (2, 3) if kind == "corridors" else (4,):
-        assert longest_stand_s(kind, strategy, robots, seed=robots) < STILL_S
+        assert stand_of(kind, strategy, robots, seed=robots).robot_s < STILL_S
 
 
 NO_PROMISES = partial(PerTimeVisibility, ExplorationConfig(metric="nearest", promises=False))
@@ -200,7 +195,7 @@ ONCE_STOOD: list[tuple[str, str | Callable[[], Strategy], int, int]] = [
 
 @pytest.mark.parametrize(("kind", "strategy", "robots", "seed"), ONCE_STOOD)
 def test_robots_do_not_stand_where_they_once_stood(kind, strategy, robots, seed):
-    assert longest_stand_s(kind, strategy, robots, seed) < 20.0
+    assert stand_of(kind, strategy, robots, seed).robot_s < 20.0
 
 
 def test_a_start_from_which_two_robots_once_stood_for_the_whole_mission():

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import re
 
-import pytest
-
 from baselines.strategies import ALIASES, CLIFF_STRATEGIES, STRATEGIES, make_strategy
 from baselines.strategies.table import TABLE, Family, help_text, markdown_list, suite_names
 from baselines.suites import SCOREBOARD
-from entropy_explore_env.errors import SettingError
 from tests.code_blocks import DOCS
 
 ENTRIES = [entry for entries in TABLE.values() for entry in entries]
@@ -41,9 +38,3 @@ def test_suites_are_named_as_they_are():
     assert {suite for entry in ENTRIES for suite in entry.suites} == set(SCOREBOARD)
     assert set(suite_names("others")) < set(suite_names("plans")) < set(suite_names("teams"))
     assert "voronoi" not in suite_names("plans") and "voronoi" in suite_names("teams")
-
-
-@pytest.mark.parametrize("gone", ["information-rate", "information-rate-v0", "information-per-scan"])
-def test_names_that_went_are_refused_like_any_other(gone):
-    with pytest.raises(SettingError, match="one of random, gradient"):
-        make_strategy(gone)

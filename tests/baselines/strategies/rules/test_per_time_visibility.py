@@ -24,22 +24,21 @@ from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import find_scenario
+from tests.planner import scenes
 
 PERFECT = {"burst": 10_000, "i_min_bits": 0.0}
 
 
 def small_plan(**settings):
-    """A quarter of an office, for robots without bodies that go anywhere."""
-    base = with_settings(scripted(find_scenario("cluttered")), {"grid": Grid((70, 60, 1), 0.1)})
+    """A quarter of an office, for robots without bodies that go anywhere, and decide at stops."""
     changes = {
         "robots": 3,
-        "robot": {"reach_m": math.inf, "body_radius_m": 0.0, "unknown_cost": 1e4},
-        "sensor": {"max_range_m": 1.5, "angular_step_rad": math.pi / 90, "scan_time_s": 2.0},
+        "robot": {"redecide": "at_stop", "unknown_cost": 1e4},
+        "sensor": {"scan_every_m": math.inf, "scan_time_s": 2.0},
         "channel": PERFECT,
-        "ending": {"sigma_end": 1e-3, "time_limit_s": 900.0},
-        "track_truth": True,
+        "ending": {"time_limit_s": 900.0},
     }
-    return with_settings(base, {**changes, **settings})
+    return with_settings(with_settings(scenes.small_plan(), changes), settings)
 
 
 def small_terrain(**settings):
