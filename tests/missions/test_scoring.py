@@ -45,11 +45,7 @@ def test_the_joint_map_knows_what_all_robots_measured_and_no_more():
     state, prior = missions.state, missions.rules.params[0]["prior_precision"]
     together = state.precision[0].astype(np.float64).sum(axis=0) - (missions.scenario.robots - 1) * prior
     np.testing.assert_allclose(state.joint_precision[0], together, rtol=1e-5)
-    assert clock_bits(missions) <= state.robots[0]["entropy_bits"].min()
-
-
-def clock_bits(missions: Missions) -> float:
-    return float(missions.state.missions[0]["joint_bits"])
+    assert state.missions[0]["joint_bits"] <= state.robots[0]["entropy_bits"].min()
 
 
 def test_nobody_acts_on_the_score():

@@ -13,37 +13,28 @@ from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 
 BODY_M = 0.3
 NATURAL = {name: scenario for name, scenario in SCENARIOS.items() if scenario.world in RECIPES}
-SEEDS = {
-    "bhattacharya-cluttered": 3,
-    "cave": 12,
-    "hybrid": 15,
-    "cluttered": 15,
-    "occlusions": 20,
-    "lab": 30,
-    "cliff": 20,
+WORLDS = {
+    "room": (50, 1.0, 1.0),
+    "box-7x11x5": (50, 1.0, 1.0),
+    "room-furnished": (50, 0.9, 0.99),
+    "office": (50, 0.94, 0.98),
+    "office-signal": (50, 0.94, 0.98),
+    "office-3d": (50, 0.84, 0.92),
+    "office-mixed": (50, 0.7, 0.92),
+    "corridor": (50, 0.2, 0.55),
+    "cluttered": (15, 0.82, 0.9),
+    "hybrid": (15, 0.5, 0.85),
+    "cave": (12, 0.06, 0.25),
+    "terrain": (50, 0.4, 0.8),
+    "terrain-smooth": (50, 0.4, 0.85),
+    "terrain-rough": (50, 0.4, 0.8),
+    "occlusions": (20, 0.85, 0.9),
+    "cliff": (20, 0.5, 0.75),
+    "lab": (30, 0.88, 0.98),
+    "bhattacharya-office": (50, 0.94, 0.98),
+    "bhattacharya-cluttered": (3, 0.85, 0.88),
 }
-"""Worlds a scenario; 50 where a world takes a millisecond or two."""
-FREE_SHARE = {
-    "room": (1.0, 1.0),
-    "box-7x11x5": (1.0, 1.0),
-    "room-furnished": (0.9, 0.99),
-    "office": (0.94, 0.98),
-    "office-signal": (0.94, 0.98),
-    "office-3d": (0.84, 0.92),
-    "office-mixed": (0.7, 0.92),
-    "corridor": (0.2, 0.55),
-    "cluttered": (0.82, 0.9),
-    "hybrid": (0.5, 0.85),
-    "cave": (0.06, 0.25),
-    "terrain": (0.4, 0.8),
-    "terrain-smooth": (0.4, 0.85),
-    "terrain-rough": (0.4, 0.8),
-    "occlusions": (0.85, 0.9),
-    "cliff": (0.5, 0.75),
-    "lab": (0.88, 0.98),
-    "bhattacharya-office": (0.94, 0.98),
-    "bhattacharya-cluttered": (0.85, 0.88),
-}
+"""Scenario → how many worlds, 50 where one takes a millisecond or two; least and most of the free share."""
 OTHER_GRIDS = {
     "office": [
         Grid((121, 233, 1), 0.07),
@@ -97,10 +88,10 @@ def require_connected(world, what):
 @pytest.mark.parametrize("name", NATURAL)
 def test_robots_of_its_scenario_can_go_wherever_they_fit(name):
     scenario = NATURAL[name]
-    low, high = FREE_SHARE[name]
+    count, low, high = WORLDS[name]
     plane = scenario.layer_of(scenario.robot)
     hashes = set()
-    for seed in range(SEEDS.get(name, 50)):
+    for seed in range(count):
         world = RECIPES[scenario.world](scenario.grid, np.random.default_rng(seed))
         assert world.grid == scenario.grid and world.name == scenario.world
         if scenario.world != "furnished":
@@ -110,7 +101,7 @@ def test_robots_of_its_scenario_can_go_wherever_they_fit(name):
         assert len(layout.starts) == room.sum(), f"{name} {seed}: {parts(room)} parts"
         assert low <= (~world.occupied).mean() <= high, f"{name} {seed}: {(~world.occupied).mean()}"
         hashes.add(world.occupied.tobytes())
-    assert len(hashes) == (1 if scenario.world == "empty" else SEEDS.get(name, 50))
+    assert len(hashes) == (1 if scenario.world == "empty" else count)
 
 
 @pytest.mark.parametrize(
@@ -139,7 +130,7 @@ def test_the_same_draws_give_the_same_world_and_nothing_else_plays_a_part(name):
 
 def test_every_recipe_is_tried_on_other_grids_and_on_too_small_ones():
     assert set(OTHER_GRIDS) == set(SMALLEST_M) == set(RECIPES) - {"empty", "furnished"}
-    assert set(FREE_SHARE) == set(NATURAL)
+    assert set(WORLDS) == set(NATURAL)
 
 
 @pytest.mark.parametrize("name", SMALLEST_M)
