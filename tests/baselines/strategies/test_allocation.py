@@ -31,12 +31,16 @@ def corridor(places, heard=True):
     build_known(missions, solid, [(3, y, 2) for y in places])
     unknown = [0, 1, 9, 10]
     missions.mean[0, :, 3, unknown, 2], missions.precision[0, :, 3, unknown, 2] = 0.5, 1e-3
-    for robot in range(len(places)) if heard else ():
-        for mate in range(len(places)):
-            seen = missions.state.heard[0, robot, mate]
-            seen["heard_s"], seen["announced_s"] = 0.0, -1.0
-            seen["pose"][:] = missions.state.robots[0, mate]["origin"]
+    if heard:
+        hear_all(missions)
     return missions
+
+
+def hear_all(missions):
+    """Let all robots have heard where all others stand, who announced nothing."""
+    heard = missions.state.heard[0]
+    heard["heard_s"], heard["announced_s"] = 0.0, -1.0
+    heard["pose"] = missions.state.robots[0]["origin"]
 
 
 def chosen(missions, spacing_m, **config):
@@ -139,11 +143,7 @@ def test_allocation_is_the_paper_s_loop():
             put(missions, robot, pose)
             missions.mean[0, robot] = np.where(known, 0.0, 0.5)
             missions.precision[0, robot] = np.where(known, 1e4, 1e-3)
-        for robot in range(3):
-            for mate in range(3):
-                seen = missions.state.heard[0, robot, mate]
-                seen["heard_s"], seen["announced_s"] = 0.0, -1.0
-                seen["pose"][:] = missions.state.robots[0, mate]["origin"]
+        hear_all(missions)
         check_against_reference(missions, known)
 
 
