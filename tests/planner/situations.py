@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 from entropy_explore_env.belief.fields import Belief
-from entropy_explore_env.belief.paths.lattice import belief_costs
 from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.planner.model import Situation
 from entropy_explore_env.planner.records import EXPERIENCE, KNOWLEDGE, MATE
@@ -13,6 +12,7 @@ from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import BOX
 from entropy_explore_env.settings.sensor import RangeSensor
+from tests.belief.paths.graphs import belief_costs
 
 SIZE, MOST = (7, 11, 5), 6
 ACTION = {"kind": "candidates", "candidates": MOST}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.fields import Belief
-from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
+from entropy_explore_env.belief.paths.lattice import new_lattice
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
 from entropy_explore_env.belief.paths.search import cost_to, new_search
 from entropy_explore_env.planner.far_places import (
@@ -25,6 +25,7 @@ from entropy_explore_env.planner.far_places import (
 )
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World
+from tests.belief.paths.graphs import belief_costs
 from tests.reference.scenes import random_belief
 
 SIZE, EDGE, TARGET = (7, 11, 5), 3, 400.0

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.fields import Belief
-from entropy_explore_env.belief.paths.lattice import belief_costs
 from entropy_explore_env.belief.visibility import CONE
 from entropy_explore_env.planner.far import _fill_far, first_stop, propose_far
 from entropy_explore_env.planner.memory import trust_and_clearance, worth_bits
@@ -23,6 +22,7 @@ from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import BOX, OFFICE, OFFICE_3D
 from entropy_explore_env.viewpoints.expected_scan import fill_bits
 from entropy_explore_env.worlds.world import World
+from tests.belief.paths.graphs import belief_costs
 
 ACTION = {"kind": "candidates", "candidates": 1}
 PLAN = with_settings(

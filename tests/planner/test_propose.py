@@ -8,7 +8,7 @@ from hypothesis import given
 
 from entropy_explore_env import EntropyExploreVectorEnv
 from entropy_explore_env.belief.fields import Belief
-from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
+from entropy_explore_env.belief.paths.lattice import new_lattice
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.planner.candidate_features import COLUMNS, FEATURES
 from entropy_explore_env.planner.recipe import NARROW_PLANNED, recipe_for
@@ -17,7 +17,7 @@ from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import BOX
 from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.viewpoints.evaluation import line_is_free, new_scratch, robot_model
-from tests.belief.paths.graphs import shortest_path
+from tests.belief.paths.graphs import belief_costs, shortest_path
 from tests.planner.situations import PRIOR, SIZE
 from tests.reference.scenes import drawn, free_box, put, random_belief, seeds, started
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.fields import Belief
-from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
+from entropy_explore_env.belief.paths.lattice import new_lattice
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
 from entropy_explore_env.belief.paths.search import cost_to, new_search
 from entropy_explore_env.settings.scenarios import BOX
@@ -24,6 +24,7 @@ from entropy_explore_env.viewpoints.evaluation import (
     voxel_at,
 )
 from entropy_explore_env.viewpoints.expected_scan import new_scan_scratch
+from tests.belief.paths.graphs import belief_costs
 
 SIZE = (7, 11, 5)
 WALLED, EDGE_M = (9, 13, 1), 0.5

@@ -83,10 +83,7 @@ class Lattice(NamedTuple):
 
 
 class Costs(NamedTuple):
-    """Traversal costs, from a belief or from a field.
-
-    Made by `belief_costs` or `costs_of`; kernels fill one in themselves.
-    """
+    """Traversal costs, from a belief or from a field."""
 
     mean: np.ndarray
     """(V,) float32 expected coverage."""
@@ -206,47 +203,10 @@ def _newly_touched(body: np.ndarray, step: tuple[int, ...]) -> np.ndarray:
     return body[~touched[tuple((body + step - low).T)]]
 
 
-def belief_costs(
-    mean: np.ndarray,
-    precision: np.ndarray,
-    prior_precision: float,
-    unknown_cost: float = 1.0,
-    no_fly: np.ndarray | None = None,
-) -> Costs:
-    """Return the traversal costs of a belief.
-
-    Args:
-        mean: (X, Y, Z) or (V,) float32 expected coverage; voxels above ½ are impassable.
-        precision: The same shape, float32, 1/σ².
-        prior_precision: 1/σ² of a voxel that was never measured; known are voxels with KNOWN_RATIO times as
-            much.
-        unknown_cost: Traversal cost of unknown voxels, ≥ 1.
-        no_fly: The same shape, bool, voxels that may not be entered whatever is believed: above a ceiling,
-            see `worlds.world.no_fly_mask`. None = there are none.
-    """
-    flat = _flat(mean)
-    return Costs(
-        mean=flat,
-        precision=_flat(precision),
-        known_precision=KNOWN_RATIO * float(prior_precision),
-        unknown_cost=float(unknown_cost),
-        per_edge=flat[:0],
-        min_per_edge=1.0,
-        no_fly=NO_FLY_NOWHERE if no_fly is None else np.ascontiguousarray(no_fly).reshape(-1),
-    )
-
-
 def costs_of(per_edge: np.ndarray, min_per_edge: float) -> Costs:
     """Return traversal costs of a (V,) float32 field that is known to be valid, and a lower bound of them."""
     none = per_edge[:0]
     return Costs(none, none, 0.0, 1.0, per_edge, min_per_edge, NO_FLY_NOWHERE)
-
-
-def _flat(field: np.ndarray) -> np.ndarray:
-    """Return a field by voxel number, read-only, so that kernels are compiled for one kind of array."""
-    flat = np.ascontiguousarray(field, np.float32).reshape(-1).view()
-    flat.setflags(write=False)
-    return flat
 
 
 @inlined_kernel

@@ -6,7 +6,7 @@ import math
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from entropy_explore_env.belief.paths.lattice import belief_costs, costs_of, new_lattice
+from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, NO_FLY_NOWHERE, Costs, costs_of, new_lattice
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, search_paths
 from entropy_explore_env.belief.paths.search import cost_to, extract_path, new_search
 from entropy_explore_env.compilation.kernels import lean_kernel
@@ -53,10 +53,22 @@ def known(covered):
     return covered.astype(np.float32), np.full(covered.shape, KNOWN, np.float32)
 
 
+def flat_field(field):
+    """A field by voxel number, read-only, so that kernels are compiled for one kind of array."""
+    flat = np.ascontiguousarray(field, np.float32).reshape(-1).view()
+    flat.setflags(write=False)
+    return flat
+
+
+def belief_costs(mean, precision, prior_precision, unknown_cost=1.0, no_fly=NO_FLY_NOWHERE):
+    """Traversal costs of a belief, arrays (X, Y, Z) or (V,)."""
+    flat, least = flat_field(mean), KNOWN_RATIO * float(prior_precision)
+    return Costs(flat, flat_field(precision), least, float(unknown_cost), flat[:0], 1.0, no_fly.reshape(-1))
+
+
 def field_costs(per_edge):
     """Traversal costs that are given voxel by voxel, > 0; inf = impassable."""
-    flat = np.ascontiguousarray(per_edge, np.float32).reshape(-1).view()
-    flat.setflags(write=False)
+    flat = flat_field(per_edge)
     least = float(flat.min(initial=np.inf))
     return costs_of(flat, least if math.isfinite(least) else 1.0)
 

@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse.csgraph import dijkstra
 
-from entropy_explore_env.belief.paths.lattice import belief_costs, longest_edge, new_lattice
+from entropy_explore_env.belief.paths.lattice import longest_edge, new_lattice
 from entropy_explore_env.belief.paths.search import length_to, new_search
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World
-from tests.belief.paths.graphs import KNOWN, PRIOR, UNKNOWN, all_costs, graph_of
+from tests.belief.paths.graphs import KNOWN, PRIOR, UNKNOWN, all_costs, belief_costs, graph_of
 from tests.reference.scenes import drawn, random_cover, seeds
 
 SHAPES = [(7, 11, 5), (9, 8, 6), (13, 6, 7)]

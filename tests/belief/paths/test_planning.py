@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse.csgraph import dijkstra
 
-from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, belief_costs, new_lattice
+from entropy_explore_env.belief.paths.lattice import KNOWN_RATIO, new_lattice
 from entropy_explore_env.belief.paths.planning import ANY_GOAL, resume_search, search_paths, start_search
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.errors import SettingError
@@ -20,6 +20,7 @@ from tests.belief.paths.graphs import (
     PRIOR,
     UNKNOWN,
     all_costs,
+    belief_costs,
     costs_to_all,
     field_costs,
     graph_of,

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.belief.paths.lattice import belief_costs, new_lattice
+from entropy_explore_env.belief.paths.lattice import new_lattice
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.belief.paths.string_pulling import line_of_sight_cost, string_pulled
-from tests.belief.paths.graphs import field_costs, shortest_path
+from tests.belief.paths.graphs import belief_costs, field_costs, shortest_path
 from tests.reference.scenes import SHAPES, drawn, random_cover, seeds
 
 SIZE = (7, 11, 5)
