@@ -86,11 +86,6 @@ def checked_worlds(given: object) -> tuple[World, ...]:
     return worlds
 
 
-def world_in_turn(given: Sequence[World], seed: int, episode: int) -> World:
-    """Return the world of a mission: dealt by its seed, the next one with each episode that follows."""
-    return given[(seed + episode) % len(given)]
-
-
 def _from_list(scenario: Scenario, asked: object) -> tuple[World, ...]:
     """Return the worlds of a list of Worlds and paths, or a single World, on a grid that holds each.
 

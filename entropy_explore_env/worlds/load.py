@@ -18,7 +18,7 @@ from entropy_explore_env.settings.validation import check_instance, checked_path
 from entropy_explore_env.worlds.files.archives import restored, saved
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
 from entropy_explore_env.worlds.files.process import Format, Limits, read_apart
-from entropy_explore_env.worlds.files.resampling import extruded, resampled
+from entropy_explore_env.worlds.files.resampling import resampled
 from entropy_explore_env.worlds.files.voxels import (
     FREE,
     MAX_FILE_VOXELS,
@@ -41,7 +41,7 @@ from entropy_explore_env.worlds.public.fetching import public_file
 from entropy_explore_env.worlds.public.table import PUBLIC, PublicWorld
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
 from entropy_explore_env.worlds.recipes.rooms import empty
-from entropy_explore_env.worlds.splits import draw_world_number, world_generator
+from entropy_explore_env.worlds.splits import draw_world_number
 from entropy_explore_env.worlds.world import World
 from entropy_explore_env.writing import write_atomically
 
@@ -207,7 +207,7 @@ def _world(voxels: Voxels, path: str, voxel_size_m: float | None, height_m: floa
         most = MAX_FILE_VOXELS // labels.size
         if not 2 <= layers <= most:
             raise SettingError("height_m", height_m, f"from 2 to {most} voxels of {size_m} m")
-        labels = extruded(labels, layers)
+        labels = np.repeat(labels, layers, axis=2)
     shape = (int(labels.shape[0]), int(labels.shape[1]), int(labels.shape[2]))
     grid = Grid(shape, float(size_m), voxels.origin_m)
     unknown, unreadable = labels == UNKNOWN, labels == UNREADABLE
@@ -247,7 +247,7 @@ def make_world(scenario: str | Scenario, world: int | np.random.Generator) -> Wo
         raise SettingError("number", number, "a whole number ≥ 0")
     if scenario.world == "empty":
         return _empty_world(scenario)
-    return RECIPES[scenario.world](scenario.grid, world_generator(number))
+    return RECIPES[scenario.world](scenario.grid, np.random.default_rng(np.random.SeedSequence(number)))
 
 
 @lru_cache(maxsize=8)

@@ -37,8 +37,3 @@ def draw_world_number(split: str, rng: np.random.Generator) -> int:
     """
     numbers = WORLD_NUMBERS[split]
     return int(rng.integers(numbers.start, numbers.stop))
-
-
-def world_generator(number: int) -> np.random.Generator:
-    """Return the random generator that a recipe draws the world with this number from."""
-    return np.random.default_rng(np.random.SeedSequence(number))

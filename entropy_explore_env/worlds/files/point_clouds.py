@@ -81,9 +81,8 @@ def _head(head: bytes, size: int) -> tuple[list[_Field], int]:
     across = [int(words[name][0]) for name in ("WIDTH", "HEIGHT") if name in words]
     points = int(words["POINTS"][0]) if "POINTS" in words else math.prod(across)
     width = sum(field.width for field in fields)
-    if not (0 < points <= _MAX_SHRINKING * size and 0 < width <= 1 << 12):
-        raise RefusedError("a PCD with as many points as its header says")
-    if points * width > _MAX_SHRINKING * size + 4096:
+    most = _MAX_SHRINKING * size
+    if not (0 < points <= most and 0 < width <= 1 << 12 and points * width <= most + 4096):
         raise RefusedError("a PCD with as many points as its header says")
     return fields, points
 

@@ -1,4 +1,4 @@
-"""Resampling to another voxel size, by volumes such that thin walls stay solid, and extrusion of plans."""
+"""Resampling to another voxel size, by volumes such that thin walls stay solid."""
 
 from __future__ import annotations
 
@@ -107,8 +107,3 @@ def _lower(ceiling, scale, none, new_none, lowered):
                 for y in range(int(j * scale), min(ceiling.shape[1], math.ceil((j + 1) * scale))):
                     lowest = min(lowest, ceiling[x, y])
             lowered[i, j] = new_none if lowest == none else int(lowest / scale + ROUNDING)
-
-
-def extruded(plan: np.ndarray, layers: int) -> np.ndarray:
-    """Return a plan (X, Y, 1) repeated in all layers: (X, Y, layers) int8, contiguous."""
-    return np.repeat(plan, layers, axis=2)

@@ -32,22 +32,13 @@ class RockSizes(NamedTuple):
     most_m: float
 
 
-def covered_share(abundance: float, diameter_m: float) -> float:
-    """Return F_k(D), the share of the ground under rocks of at least this diameter."""
-    return abundance * math.exp(-_decay(abundance) * diameter_m)
-
-
-def _decay(abundance: float) -> float:
-    return _DECAY + _DECAY_OF_SPARSE / abundance
-
-
 def draw_diameters(sizes: RockSizes, area_m2: float, rng: np.random.Generator) -> np.ndarray:
     """Return (N,) diameters in metres of the rocks on some ground, the largest first.
 
     The number of rocks a square metre and metre of diameter is -F_k'(D)/(πD²/4); N is Poisson.
     """
     edges = np.linspace(sizes.least_m, sizes.most_m, _STEPS + 1)
-    decay = _decay(sizes.abundance)
+    decay = _DECAY + _DECAY_OF_SPARSE / sizes.abundance
     density = sizes.abundance * decay * np.exp(-decay * edges) / (0.25 * math.pi * edges**2)
     numbers = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(edges))])
     count = rng.poisson(area_m2 * numbers[-1])

@@ -12,13 +12,7 @@ from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import CLIFF
 from entropy_explore_env.worlds.load import make_world
 from entropy_explore_env.worlds.recipes.cliff import PLATEAU_M, cliff
-from entropy_explore_env.worlds.recipes.rocks import (
-    VIKING_2,
-    RockSizes,
-    covered_share,
-    draw_diameters,
-    raise_rocks,
-)
+from entropy_explore_env.worlds.recipes.rocks import VIKING_2, RockSizes, draw_diameters, raise_rocks
 from entropy_explore_env.worlds.world import Collision
 
 GRIDS = [CLIFF.grid, Grid((31, 47, 20), 0.3), Grid((23, 17, 9), 0.5)]
@@ -69,14 +63,14 @@ def test_a_band_at_one_end_is_smooth_and_unreadable_and_both_ends_occur():
 
 def test_rocks_cover_what_was_found_at_the_second_viking_site():
     """Cumulative area by diameter against F_k(D), Golombek & Rapp 1997, where they are numerous."""
-    assert covered_share(VIKING_2, 0.0) == 0.176
-    assert covered_share(0.069, 1.0) == pytest.approx(0.069 * math.exp(-1.79 - 0.152 / 0.069))
+    assert VIKING_2 == 0.176
     sizes, area_m2 = RockSizes(VIKING_2, 0.1, 1.5), 2e5
     drawn = draw_diameters(sizes, area_m2, np.random.default_rng(0))
     assert (np.diff(drawn) <= 0.0).all() and drawn.min() >= 0.1 and drawn.max() <= 1.5
     areas = 0.25 * math.pi * drawn**2
     for least_m in (0.1, 0.2, 0.4, 0.8):
-        expected = covered_share(VIKING_2, least_m) - covered_share(VIKING_2, 1.5)
+        shares = (0.176 * math.exp(-(1.79 + 0.152 / 0.176) * edge_m) for edge_m in (least_m, 1.5))
+        expected = next(shares) - next(shares)
         assert areas[drawn >= least_m].sum() / area_m2 == pytest.approx(expected, rel=0.03)
 
 
