@@ -100,6 +100,12 @@ def point(array):
     return array[0], array[1], array[2]
 
 
+@inlined_kernel
+def distance_between(a, b):
+    """Return the distance between two points (x, y, z)."""
+    return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+
+
 @lean_kernel
 def longest_crossing(size_x, size_y, size_z, length, voxels_behind):
     """Return the most voxels that a ray can cross: the scratch space that `cast_ray` needs.

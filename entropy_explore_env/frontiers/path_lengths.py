@@ -16,6 +16,7 @@ from entropy_explore_env.belief.paths.layer_lengths import fill_layer_lengths
 from entropy_explore_env.belief.paths.planning import resume_search, search_paths, start_search
 from entropy_explore_env.belief.paths.search import Search, extract_path, length_to, new_search
 from entropy_explore_env.belief.paths.string_pulling import line_of_sight_cost, string_pulled
+from entropy_explore_env.belief.raycast import distance_between
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.frontiers.blocks import NONE
@@ -255,7 +256,6 @@ def fill_free_lines(
         for second in range(first):
             a = (places[first, 0], places[first, 1], places[first, 2])
             b = (places[second, 0], places[second, 1], places[second, 2])
-            apart = math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
-            if apart <= farthest:
+            if distance_between(a, b) <= farthest:
                 cost = line_of_sight_cost(search, lattice, costs, a, b)
                 seen[first, second] = seen[second, first] = not math.isinf(cost)

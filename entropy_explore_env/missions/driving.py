@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.belief.raycast import Line, point
+from entropy_explore_env.belief.raycast import Line, distance_between, point
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.localization import (
     believed_pose,
@@ -17,7 +17,6 @@ from entropy_explore_env.missions.localization import (
 )
 from entropy_explore_env.missions.poses import (
     copy_numbers,
-    distance_between,
     grid_size,
     path_point,
     place_at,

@@ -9,7 +9,7 @@ import numpy as np
 
 from entropy_explore_env.belief.map_update import fuse_scan
 from entropy_explore_env.belief.pooling import Cells, Pool, fuse_pooled_scan
-from entropy_explore_env.belief.raycast import point
+from entropy_explore_env.belief.raycast import distance_between, point
 from entropy_explore_env.compilation.kernels import ASSERTING, lean_kernel
 from entropy_explore_env.missions.backlog import TeamBacklog
 from entropy_explore_env.missions.faults import (
@@ -31,7 +31,6 @@ from entropy_explore_env.missions.localization import (
 from entropy_explore_env.missions.own_maps import TeamSummaries
 from entropy_explore_env.missions.poses import (
     copy_numbers,
-    distance_between,
     grid_size,
     pose_at,
     within_grid,

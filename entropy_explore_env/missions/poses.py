@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.belief.raycast import point
+from entropy_explore_env.belief.raycast import distance_between, point
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.robots.motion import SpeedProfile, driven_share, speed_after, turning_time
 
@@ -49,12 +49,6 @@ def path_point(robot, number):
     if number > 0:
         return point(robot.path[number - 1])
     return point(robot.origin)
-
-
-@inlined_kernel
-def distance_between(a, b):
-    """Return the distance between two points (x, y, z)."""
-    return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
 
 
 @inlined_kernel

@@ -20,13 +20,12 @@ from __future__ import annotations
 
 import math
 
-from entropy_explore_env.belief.raycast import point
+from entropy_explore_env.belief.raycast import distance_between, point
 from entropy_explore_env.compilation.kernels import lean_kernel, record_type
 from entropy_explore_env.missions.action import decode_action
 from entropy_explore_env.missions.localization import believed_pose
 from entropy_explore_env.missions.poses import (
     copy_numbers,
-    distance_between,
     place_with_left,
     pose_at,
     share_left,

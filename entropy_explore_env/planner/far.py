@@ -7,6 +7,7 @@ import math
 from entropy_explore_env.belief.paths.lattice import cell_of, standing_voxel
 from entropy_explore_env.belief.paths.search import extract_path
 from entropy_explore_env.belief.paths.string_pulling import Path, string_pull
+from entropy_explore_env.belief.raycast import distance_between
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.planner.far_places import (
@@ -19,7 +20,7 @@ from entropy_explore_env.planner.far_places import (
     place_of,
     promised_around,
 )
-from entropy_explore_env.planner.memory import copy_numbers, distance_apart, value_of, worth_bits
+from entropy_explore_env.planner.memory import copy_numbers, value_of, worth_bits
 from entropy_explore_env.planner.nearby import cost_of, evaluate, search_within
 from entropy_explore_env.planner.states import PlannerState
 from entropy_explore_env.planner.thresholds import FAR_PITCH_RAD, FIRST_RADIUS
@@ -228,11 +229,11 @@ def first_stop(proposer, situation, goal, stop):
         if string_pull(search, lattice, situation.costs, way, scratch.waypoints) == 0:
             return False
         corner = scratch.waypoints[0]
-        share = min(1.0, reach / max(distance_apart(corner, here), 1e-9))
+        share = min(1.0, reach / max(distance_between(corner, here), 1e-9))
         for axis in range(3):
             stop[axis] = here[axis] + share * (corner[axis] - here[axis])
         return True
-    if distance_apart(goal, here) <= reach:
+    if distance_between(goal, here) <= reach:
         return True
     for number in range(count):
         cell = grid_index(lattice.size, path[number])
@@ -256,7 +257,7 @@ def gaze_on_the_way(proposer, situation, gazes, goal, stop):
     """
     scratch, most = proposer.scratch, -1.0
     tried = scratch.at
-    if distance_apart(goal, stop) < 1e-6 or proposer.all_around:
+    if distance_between(goal, stop) < 1e-6 or proposer.all_around:
         gazes = 1
     copy_numbers(stop, tried)
     for number in range(gazes):

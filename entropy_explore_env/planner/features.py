@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from entropy_explore_env.belief.raycast import distance_between
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.planner.candidate_features import COLUMNS, CONTEXT_COLUMNS, FEATURES
 from entropy_explore_env.planner.far_places import bits_around
-from entropy_explore_env.planner.memory import distance_apart
 from entropy_explore_env.planner.nearby import cost_of
 from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.robots.motion import driving_time
@@ -43,7 +43,7 @@ def clip(value):
 @lean_kernel
 def _path_length(proposer, situation, goal, kind):
     """Return the length of the path to a goal in voxel edges, straight where the robot drives so."""
-    straight = distance_apart(goal, situation.knowledge.pose)
+    straight = distance_between(goal, situation.knowledge.pose)
     if straight > 1e-9 and (proposer.planned or kind == _FAR):
         cost = cost_of(proposer, situation, goal)
         if cost < math.inf:
@@ -86,7 +86,7 @@ def _contest(proposer, situation, goal, seconds):
     soonest = math.inf
     for mate in situation.mates:
         if not mate.silent:
-            length_m = distance_apart(mate.place, goal) * proposer.exact.voxel_size_m
+            length_m = distance_between(mate.place, goal) * proposer.exact.voxel_size_m
             there_s = driving_time(length_m, mate.max_speed_m_s, mate.acceleration_m_s2) + mate.scan_time_s
             soonest = min(soonest, there_s)
     if math.isinf(soonest):
@@ -121,7 +121,7 @@ def _is_goal(situation, pool, number):
     """Return whether a viewpoint of the pool leads to the far place to which the robot is on its way."""
     if not situation.experience.going or pool[number].kind != _FAR:
         return False
-    return distance_apart(pool[number].goal, situation.experience.goal) < 1e-6
+    return distance_between(pool[number].goal, situation.experience.goal) < 1e-6
 
 
 @lean_kernel
@@ -151,7 +151,7 @@ def _write_place(proposer, situation, number, selection, row):
     goal, kind, diagonal = pool[number].goal, pool[number].kind, _diagonal(size)
     row[_ON_SPOT] = 1.0 if kind == _SPOT else 0.0
     row[_IS_FAR] = 1.0 if kind == _FAR else 0.0
-    straight, path = distance_apart(goal, here), _path_length(proposer, situation, goal, kind)
+    straight, path = distance_between(goal, here), _path_length(proposer, situation, goal, kind)
     away = _distance_to_remaining(proposer.blocks, goal, selection.remaining)
     row[_ELSEWHERE] = 1.0 - _share_around(proposer, size, goal, selection.remaining)
     row[_ADVANTAGE] = min(max((away - path) / diagonal, -1.0), 1.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from entropy_explore_env.belief.raycast import distance_between
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.planner.states import PlannerState, next_state
@@ -24,6 +25,7 @@ from entropy_explore_env.planner.thresholds import (
     SAME_PLACE,
 )
 from entropy_explore_env.robots.motion import MoveEnd
+from entropy_explore_env.robots.pose_covariance import turn_between
 
 _NONE, _FAR, _EXPLORING = int(Kind.NONE), int(Kind.FAR), int(PlannerState.EXPLORING)
 _TEAMMATE, _EDGE = MoveEnd.TEAMMATE.code, MoveEnd.EDGE.code
@@ -40,26 +42,14 @@ def copy_numbers(source, target):
 
 
 @lean_kernel
-def turned(angle, other):
-    """Return how far an angle is from another, 0 to π."""
-    return abs((angle - other + math.pi) % (2.0 * math.pi) - math.pi)
-
-
-@lean_kernel
-def distance_apart(a, b):
-    """Return the distance between two places, the first three numbers of each."""
-    return math.sqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2)
-
-
-@lean_kernel
 def chosen_number(candidates, target):
     """Return the number of the candidate, in grid units, that a robot chose last; -1 = something else."""
     for number in range(len(candidates)):
         at = candidates[number].viewpoint
         if (
             candidates[number].kind != _NONE
-            and distance_apart(at, target) < _CHOSEN
-            and turned(at[3], target[3]) < _CHOSEN_RAD
+            and distance_between(at, target) < _CHOSEN
+            and turn_between(target[3], at[3]) < _CHOSEN_RAD
             and abs(at[4] - target[4]) < _CHOSEN_RAD
         ):
             return number
@@ -92,7 +82,7 @@ def learn(experience, candidates, knowledge, number, came_bits, body_radius):
         experience.blocked = KEEP_CLEAR_DECISIONS
     if knowledge.move_end == _EDGE:
         _remember_edge(experience, here, target, body_radius)
-    missed = distance_apart(target, here)
+    missed = distance_between(target, here)
     expected = candidates[number].bits if number >= 0 else 0.0
     came = max(came_bits, 0.0)
     _count_low_gains(experience, here, expected)
@@ -109,7 +99,7 @@ def learn(experience, candidates, knowledge, number, came_bits, body_radius):
 @lean_kernel
 def _count_low_gains(experience, here, expected):
     """Count scans of low gain in a row from one place; once the planner is depleted, from any place."""
-    moved = distance_apart(experience.stood_at, here) >= SAME_PLACE
+    moved = distance_between(experience.stood_at, here) >= SAME_PLACE
     if moved:
         copy_numbers(here, experience.stood_at)
     low = expected < LOW_GAIN * experience.most_bits
@@ -148,7 +138,7 @@ def value_of(proposer, situation, bits, seconds):
 def _forget(experience, here):
     """Forget the failures that lie far behind: as if all of the expected bits had come."""
     for number in range(min(experience.failures, REMEMBERED)):
-        if distance_apart(experience.failed[number], here) >= experience.forget_at[number]:
+        if distance_between(experience.failed[number], here) >= experience.forget_at[number]:
             experience.share[number] = 1.0
 
 
@@ -164,7 +154,7 @@ def _remember(experience, viewpoint, share, forget_at):
 @lean_kernel
 def _remember_edge(experience, here, target, body_radius):
     """Remember the first place on the way to a target at which the ground does not carry a robot."""
-    length = distance_apart(here, target)
+    length = distance_between(here, target)
     if length == 0.0:
         return
     at = experience.edge_at[experience.edges % REMEMBERED_EDGES]
@@ -182,15 +172,15 @@ def trust_in(experience, all_around, at):
     """
     trust, here, count = 1.0, 0, min(experience.failures, REMEMBERED)
     for number in range(count):
-        there = distance_apart(experience.failed[number], at) < SAME_PLACE
+        there = distance_between(experience.failed[number], at) < SAME_PLACE
         here += int(there and experience.share[number] < 1.0)
     alike_rad = SAME_GAZE_RAD * (1 + max(here - FAILED_GAZES, 0))
     for number in range(count):
         failed, share = experience.failed[number], experience.share[number]
-        if distance_apart(failed, at) >= SAME_PLACE:
+        if distance_between(failed, at) >= SAME_PLACE:
             continue
         if share > 0.0 and not all_around:
-            if turned(failed[3], at[3]) >= alike_rad or abs(failed[4] - at[4]) >= alike_rad:
+            if turn_between(at[3], failed[3]) >= alike_rad or abs(failed[4] - at[4]) >= alike_rad:
                 continue
         trust *= share
     return trust

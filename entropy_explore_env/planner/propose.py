@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 
+from entropy_explore_env.belief.raycast import distance_between
 from entropy_explore_env.belief.visibility import mark_cones
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.planner.far import first_stop, gaze_on_the_way, propose_far
@@ -16,7 +17,6 @@ from entropy_explore_env.planner.features import Selection
 from entropy_explore_env.planner.memory import (
     chosen_number,
     copy_numbers,
-    distance_apart,
     learn,
     trust_and_clearance,
     weigh_time,
@@ -56,7 +56,7 @@ def _looks_far(proposer, situation, best):
         return True
     if recipe.far_below < 1.0:
         return best.bits < recipe.far_below * experience.most_bits and experience.patience <= 0
-    moved = not experience.looked_far or distance_apart(experience.far_at, situation.knowledge.pose) > 0.5
+    moved = not experience.looked_far or distance_between(experience.far_at, situation.knowledge.pose) > 0.5
     return moved or best.value < experience.far_value or experience.patience <= 0
 
 
@@ -105,7 +105,7 @@ def _add_far(proposer, situation, state, size, near, most):
 def _is_goal_taken(options, goal):
     """Return whether one of some far viewpoints leads to the same place."""
     for number in range(len(options)):
-        if distance_apart(options[number].goal, goal) < 0.5:
+        if distance_between(options[number].goal, goal) < 0.5:
             return True
     return False
 
@@ -187,7 +187,7 @@ def choose(proposer, situation, state, size, most_far):
     copy_numbers(other, pool[size].goal)
     pool[size].bits, pool[size].stop_bits, pool[size].value = 0.0, 0.0, 0.0
     pool[size].seconds = math.inf
-    pool[size].kind = _NEAR if distance_apart(other, here) > 0.0 else _SPOT
+    pool[size].kind = _NEAR if distance_between(other, here) > 0.0 else _SPOT
     return size + 1, size
 
 
@@ -270,7 +270,7 @@ def _keep_target(proposer, situation, number):
 @lean_kernel
 def _pull_within(proposer, here, at):
     """Pull a viewpoint within reach of where the robot is."""
-    length = distance_apart(at, here)
+    length = distance_between(at, here)
     if length > proposer.reach:
         for axis in range(3):
             at[axis] = here[axis] + (at[axis] - here[axis]) * proposer.reach / length

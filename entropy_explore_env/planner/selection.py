@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from entropy_explore_env.belief.raycast import distance_between
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.planner.memory import distance_apart, turned, value_of, worth_bits
+from entropy_explore_env.planner.memory import value_of, worth_bits
 from entropy_explore_env.planner.records import Kind
 from entropy_explore_env.planner.thresholds import (
     ALIKE_REACH,
@@ -17,6 +18,7 @@ from entropy_explore_env.planner.thresholds import (
     NEAR_SHARE,
 )
 from entropy_explore_env.planner.views import clear_marks, look_from, mark_view
+from entropy_explore_env.robots.pose_covariance import turn_between
 
 _NEAR, _FAR = int(Kind.NEAR), int(Kind.FAR)
 _WHATEVER = 2.0
@@ -108,12 +110,12 @@ def _is_other(proposer, number, count):
 @lean_kernel
 def _is_alike(proposer, at, other):
     """Return whether two viewpoints hardly differ."""
-    if distance_apart(at, other) >= ALIKE_REACH * proposer.within:
+    if distance_between(at, other) >= ALIKE_REACH * proposer.within:
         return False
     if proposer.all_around:
         return True
     apart = ALIKE_WIDTH * proposer.view_width_rad
-    return turned(at[3], other[3]) * math.cos(at[4]) < apart and abs(at[4] - other[4]) < apart
+    return turn_between(other[3], at[3]) * math.cos(at[4]) < apart and abs(at[4] - other[4]) < apart
 
 
 @lean_kernel

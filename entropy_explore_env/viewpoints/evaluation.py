@@ -21,6 +21,7 @@ from entropy_explore_env.belief.raycast import (
     Crossing,
     Line,
     cast_ray,
+    distance_between,
     longest_crossing,
     point,
 )
@@ -199,8 +200,7 @@ def straight_seconds(belief, voxel_size_m, drive, here, at, scratch):
     """
     if not line_is_free(belief, here, at, drive.body_radius, scratch):
         return math.inf
-    length = math.sqrt((at[0] - here[0]) ** 2 + (at[1] - here[1]) ** 2 + (at[2] - here[2]) ** 2)
-    return _seconds(drive, length * voxel_size_m, 1, here, at)
+    return _seconds(drive, distance_between(here, at) * voxel_size_m, 1, here, at)
 
 
 @lean_kernel
@@ -210,7 +210,7 @@ def travel_seconds(drive, voxel_size_m, here, at, cost, reach):
     The path's cost is that of its steps, in voxel edges; seconds are inf where that is. A hop is no longer
     than `reach` voxel edges, with a scan after each; inf allowed.
     """
-    straight = math.sqrt((at[0] - here[0]) ** 2 + (at[1] - here[1]) ** 2 + (at[2] - here[2]) ** 2)
+    straight = distance_between(here, at)
     length = 0.0
     if straight > 1e-9:
         length = max(straight, STRAIGHTENED * cost)

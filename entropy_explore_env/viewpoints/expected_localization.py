@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.belief.raycast import STOP_AT_COVERED, Line, cast_range, point
+from entropy_explore_env.belief.raycast import STOP_AT_COVERED, Line, cast_range, distance_between, point
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.robots.landmarks import foresee_landmark
 from entropy_explore_env.robots.pose_covariance import (
@@ -101,7 +101,7 @@ def foresee_covariance(covariance, surveyor, drive):
     metres, left_m = 0.0, surveyor.scan_every_m - drive.since_scan_m
     for number in range(len(drive.path_m)):
         end = point(drive.path_m[number])
-        leg_m = math.sqrt((end[0] - begin[0]) ** 2 + (end[1] - begin[1]) ** 2 + (end[2] - begin[2]) ** 2)
+        leg_m = distance_between(begin, end)
         done_m = 0.0
         while leg_m - done_m > max(left_m, 0.0):
             done_m += max(left_m, 0.0)

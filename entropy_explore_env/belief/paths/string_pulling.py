@@ -16,6 +16,7 @@ import numpy as np
 
 from entropy_explore_env.belief.paths.lattice import Costs, Lattice
 from entropy_explore_env.belief.paths.search import Search, cost_per_edge, cost_to, is_passable, mark_of
+from entropy_explore_env.belief.raycast import distance_between, point
 from entropy_explore_env.belief.voxel_index import flat_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 
@@ -86,9 +87,7 @@ def line_of_sight_cost(search, lattice, costs, start, finish):
     x, step_x = _axis(start[0], finish[0], size[0])
     y, step_y = _axis(start[1], finish[1], size[1])
     z, step_z = _axis(start[2], finish[2], size[2])
-    length = math.sqrt(
-        (finish[0] - start[0]) ** 2 + (finish[1] - start[1]) ** 2 + (finish[2] - start[2]) ** 2
-    )
+    length = distance_between(start, finish)
     voxel = flat_index(size, x, y, z)
     per_edge = cost_per_edge(lattice, costs, voxel, mark_of(search, lattice, costs, voxel, x, y, z))
     share, total = 0.0, 0.0
@@ -138,11 +137,6 @@ def _stop(lattice, path, number):
 
 
 @inlined_kernel
-def _distance(a, b):
-    return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-
-
-@inlined_kernel
 def _cost_along(search, lattice, costs, path, number):
     """Return the cost of the path from the start to a stop."""
     if number == 0:
@@ -150,12 +144,12 @@ def _cost_along(search, lattice, costs, path, number):
     voxels, start, finish = path.voxels, path.start, path.finish
     first = _stop(lattice, path, _FIRST)
     mark = np.int64(search.mark[voxels[0]])
-    cost = _distance((start[0], start[1], start[2]), first) * cost_per_edge(lattice, costs, voxels[0], mark)
+    cost = distance_between(point(start), first) * cost_per_edge(lattice, costs, voxels[0], mark)
     cost += cost_to(search, voxels[min(number, path.count) - 1]) - cost_to(search, voxels[0])
     if number > path.count:
         last, end = _stop(lattice, path, path.count), voxels[path.count - 1]
         mark = np.int64(search.mark[end])
-        cost += _distance(last, (finish[0], finish[1], finish[2])) * cost_per_edge(lattice, costs, end, mark)
+        cost += distance_between(last, point(finish)) * cost_per_edge(lattice, costs, end, mark)
     return cost
 
 
@@ -198,7 +192,7 @@ def string_pull(search, lattice, costs, path, waypoints):
             else:
                 bad = trial
         at, to = _stop(lattice, path, here), _stop(lattice, path, good)
-        if _distance(at, to) > 0.0:
+        if distance_between(at, to) > 0.0:
             waypoints[filled, 0], waypoints[filled, 1], waypoints[filled, 2] = to
             filled += 1
         here = good
