@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.errors import MissingExtraError
+from entropy_explore_env.errors import imported
 
 _PEERS = {"octomap": "octomap-python", "mpe2.simple_spread_v3": "mpe2"}
 """Module → package."""
@@ -22,10 +21,7 @@ def load_peer(module: str) -> Any:  # noqa: ANN401 - a module
         MissingExtraError: It is not installed.
     """
     os.environ["OMP_NUM_THREADS"] = "1"  # OctoMap's wheels may be built with OpenMP
-    try:
-        return importlib.import_module(module)
-    except ImportError:
-        raise MissingExtraError(_PEERS[module], "bench") from None
+    return imported(module, _PEERS[module], "bench")
 
 
 def load_peers() -> None:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import importlib
 import pickle
 from collections.abc import Iterable
+from typing import Any
 
 CPU_BUILD = "https://download.pytorch.org/whl/cpu"
 """Index of PyTorch's CPU build: what other indices have brings gigabytes of CUDA libraries."""
@@ -122,3 +124,15 @@ class MissingExtraError(EntropyExploreError, ImportError):
     def __reduce__(self) -> tuple[type, tuple[str, str]]:
         """Restore the error in another process."""
         return type(self), (self.package, self.extra)
+
+
+def imported(module: str, package: str, extra: str) -> Any:  # noqa: ANN401 - a module
+    """Return a module of a package that one of our extras brings.
+
+    Raises:
+        MissingExtraError: It is not installed.
+    """
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        raise MissingExtraError(package, extra) from None

@@ -11,7 +11,7 @@ import sys
 from dataclasses import dataclass
 from typing import Any
 
-from entropy_explore_env.errors import EntropyExploreError, MissingExtraError, SettingError
+from entropy_explore_env.errors import EntropyExploreError, SettingError, imported
 
 LOCAL = "local"
 """In place of an address: a cluster of this machine alone, for this command alone."""
@@ -53,10 +53,7 @@ def ray_of(extra: str) -> Any:  # noqa: ANN401 - a module that may not be there
     """
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     os.environ.setdefault("PYTHONWARNINGS", "ignore::DeprecationWarning")  # Ray's own, in every process
-    try:
-        import ray
-    except ImportError:
-        raise MissingExtraError("ray" if extra == "cluster" else f"ray[{extra}]", extra) from None
+    ray = imported("ray", "ray" if extra == "cluster" else f"ray[{extra}]", extra)
     logging.getLogger("ray").setLevel(logging.ERROR)
     return ray
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from entropy_explore_env.belief.belief_map import Map
 from entropy_explore_env.belief.measurement_model import Return
-from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.errors import SettingError, imported
 from entropy_explore_env.interop.map_files import octomap_of
 from entropy_explore_env.interop.messages import ARROW_M, percent_of
 from entropy_explore_env.interop.team_maps import joint_map
@@ -49,13 +49,10 @@ def typestore() -> Any:  # noqa: ANN401 - a Typestore
     Raises:
         MissingExtraError: rosbags is not installed.
     """
-    try:
-        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-    except ImportError as error:
-        raise MissingExtraError("rosbags", "ros") from error
-    store = get_typestore(Stores.ROS2_JAZZY)
+    typesys = imported("rosbags.typesys", "rosbags", "ros")
+    store = typesys.get_typestore(typesys.Stores.ROS2_JAZZY)
     for name, text in OCTOMAP_TYPES.items():
-        store.register(get_types_from_msg(text, name))
+        store.register(typesys.get_types_from_msg(text, name))
     return store
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from PIL import Image
 
 from entropy_explore_env.belief.belief_map import Map
-from entropy_explore_env.errors import MissingExtraError, SettingError, WorldError, one_of
+from entropy_explore_env.errors import SettingError, WorldError, imported, one_of
 from entropy_explore_env.robots.rotations import turned_by
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.validation import check_instance, checked_path, is_number
@@ -110,10 +110,7 @@ def octomap_of(belief: Map, full: bool) -> bytes:
         SettingError: The grid is turned, or its corners are no multiples of the voxels' edge.
         MissingExtraError: octomap-python is not installed.
     """
-    try:
-        import octomap
-    except ImportError as error:
-        raise MissingExtraError("octomap-python", "worlds") from error
+    octomap = imported("octomap", "octomap-python", "worlds")
     grid, edge_m = belief.grid, belief.grid.voxel_size_m
     corner = np.asarray(grid.origin_m) / edge_m
     if belief.yaw_rad != 0.0 or np.abs(corner - np.rint(corner)).max() > _ON_LATTICE:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.errors import SettingError, imported
 from entropy_explore_env.settings.validation import is_whole
 from entropy_explore_env.writing import write_atomically
 
@@ -125,11 +125,7 @@ class Window:
             MissingExtraError: pygame-ce is not installed.
         """
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-        try:
-            import pygame
-        except ImportError as error:
-            raise MissingExtraError("pygame-ce", "render") from error
-        self._pygame: Any = pygame
+        self._pygame = imported("pygame", "pygame-ce", "render")
         self._title = title
         self._frames_per_s = frames_per_s
         self._screen: Any = None
@@ -231,10 +227,7 @@ def write_video(frames: Iterable[np.ndarray], path: Path, frames_per_s: int) -> 
         SettingError: There are no pictures, or of different sizes, or too many a second.
         MissingExtraError: PyAV is not installed.
     """
-    try:
-        import av
-    except ImportError as error:
-        raise MissingExtraError("av", "viewer") from error
+    av = imported("av", "av", "viewer")
     if not is_whole(frames_per_s, 1, 240):
         raise SettingError("frames_per_s", frames_per_s, "a whole number from 1 to 240")
     buffer, shape = io.BytesIO(), (0, 0, 3)

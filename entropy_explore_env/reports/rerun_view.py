@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.errors import MissingExtraError
+from entropy_explore_env.errors import imported
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.colours import COLOURS, robot_colour
 from entropy_explore_env.reports.painting import entropy_share, remaining_share, world_name
@@ -57,11 +57,7 @@ class RerunView:
             MissingExtraError: rerun-sdk is not installed.
             OSError: The folder cannot be written to.
         """
-        try:
-            import rerun
-        except ImportError as error:
-            raise MissingExtraError("rerun-sdk", "viewer") from error
-        rr: Any = rerun  # its names come from modules that type checkers do not follow
+        rr = imported("rerun", "rerun-sdk", "viewer")
         self.path, self._missions, self._rr = path, missions, rr
         name = f"{world_name(missions, 0)}, seed {missions.seeds[0]}"
         together = rr.ChunkBatcherConfig(flush_tick=3600.0, flush_num_bytes=1 << 22)

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import ndimage
 
-from entropy_explore_env.errors import MissingExtraError
+from entropy_explore_env.errors import imported
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.world import World, box_around, part_of
 
@@ -78,11 +78,9 @@ def picture(world: World, starts: np.ndarray | None = None) -> bytes:
     Raises:
         MissingExtraError: matplotlib is not installed.
     """
-    try:
-        from matplotlib.figure import Figure
-        from matplotlib.patches import Patch
-    except ImportError:
-        raise MissingExtraError("matplotlib", "baselines") from None
+    figures = imported("matplotlib.figure", "matplotlib", "baselines")
+    from matplotlib.patches import Patch
+
     title, box = _title(world), box_around(_seen(world))
     world = part_of(world, box)
     views, (across, *upwards) = _views(world), world.grid.size_m
@@ -91,7 +89,7 @@ def picture(world: World, starts: np.ndarray | None = None) -> bytes:
     scale = _LONG_SIDE / max(across, upwards[0])  # inches a metre, of all views
     heights = [scale * height * view.stretch for height, view in zip(upwards, views, strict=False)]
     size = max(_LEAST_WIDTH, scale * across + _AROUND), sum(heights) + _AROUND * (1 + len(views))
-    figure = Figure(figsize=size, dpi=_DOTS, layout="constrained")
+    figure = figures.Figure(figsize=size, dpi=_DOTS, layout="constrained")
     axes = figure.subplots(len(views), 1, squeeze=False, height_ratios=heights)[:, 0]
     x_m, *others_m = world.grid.origin_m
     for ax, view, low_m, height_m in zip(axes, views, others_m, upwards, strict=False):

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.errors import MissingExtraError
+from entropy_explore_env.errors import MissingExtraError, imported
 from entropy_explore_env.worlds.files.elevation import MAX_SAMPLES, columns_of_rows, degrees_as_metres
 from entropy_explore_env.worlds.files.voxels import Options, RefusedError, Voxels, content
 
@@ -169,12 +169,8 @@ def _unit_of_system_m(code: int) -> float:
     """Return the metres of the unit of a reference system by its EPSG code; 1 if no system has it."""
     if not 0 < code <= _LAST_SYSTEM:
         return 1.0
+    pyproj = imported("pyproj", "pyproj", "worlds")
     try:
-        from pyproj import CRS
-        from pyproj.exceptions import CRSError
-    except ImportError:
-        raise MissingExtraError("pyproj", "worlds") from None
-    try:
-        return float(CRS.from_epsg(code).axis_info[0].unit_conversion_factor)
-    except CRSError:
+        return float(pyproj.CRS.from_epsg(code).axis_info[0].unit_conversion_factor)
+    except pyproj.exceptions.CRSError:
         raise RefusedError(f"a GeoTIFF whose reference system is known, not EPSG {code}") from None

@@ -22,7 +22,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from entropy_explore_env.errors import MissingExtraError, SettingError
+from entropy_explore_env.errors import MissingExtraError, SettingError, imported
 from entropy_explore_env.worlds.files.voxels import Options, RefusedError, Voxels, memory_allowed
 
 try:
@@ -49,8 +49,8 @@ def _answer(request: dict[str, Any]) -> tuple[dict[str, Any], list[np.ndarray]]:
     """Return the header and arrays of the answer to a request."""
     try:
         reader = importlib.import_module(_READERS + request["reader"])
-        for module, package in reader.NEEDS:
-            _import(module, package)
+        for module, package in reader.NEEDS:  # before the reader's time is measured
+            imported(module, package, "baselines" if package == "matplotlib" else "worlds")
         voxels = _read(reader, request)
     except RefusedError as error:
         return {"refused": str(error)}, []
@@ -72,15 +72,6 @@ def _answer(request: dict[str, Any]) -> tuple[dict[str, Any], list[np.ndarray]]:
         "notes": voxels.notes,
     }
     return header, arrays
-
-
-def _import(module: str, package: str) -> None:
-    """Import what a reader needs, before its time is measured."""
-    try:
-        importlib.import_module(module)
-    except ImportError:
-        extra = "baselines" if package == "matplotlib" else "worlds"
-        raise MissingExtraError(package, extra) from None
 
 
 def _read(reader: Any, request: dict[str, Any]) -> Voxels:  # noqa: ANN401 - a module

@@ -6,11 +6,10 @@ import hashlib
 import os
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import platformdirs
 
-from entropy_explore_env.errors import MissingExtraError, SettingError, WorldError, did_you_mean
+from entropy_explore_env.errors import SettingError, WorldError, did_you_mean, imported
 from entropy_explore_env.worlds.public.table import PUBLIC, PublicWorld
 
 FOLDER_VARIABLE = "ENTROPY_EXPLORE_WORLDS"
@@ -88,15 +87,12 @@ def _digest_of(file: Path, changed_ns: int, size: int) -> str:
 
 def _fetched(name: str, world: PublicWorld, folder: Path) -> Path:
     """Fetch the files of a world into a folder, in which a file appears only with the right content."""
-    try:
-        import pooch
-    except ImportError:
-        raise MissingExtraError("pooch", "baselines") from None
+    pooch = imported("pooch", "pooch", "baselines")
     pooch.get_logger().setLevel("WARNING")
     for file, known in world.files.items():
         url = f"{HOST}/{world.source.folder}/{file}"
         try:
-            downloader: Any = pooch.HTTPDownloader(timeout=_TIMEOUT_S)
+            downloader = pooch.HTTPDownloader(timeout=_TIMEOUT_S)
             pooch.retrieve(url, f"sha256:{known}", file, folder, downloader=downloader)
         except (OSError, ValueError) as error:
             names = " and ".join(world.files)
