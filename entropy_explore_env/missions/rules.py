@@ -11,7 +11,7 @@ from entropy_explore_env.belief.pooling import Cells, new_cells, no_cells
 from entropy_explore_env.compilation.kernels import record_type
 from entropy_explore_env.robots.faults import FAULT_PARAMS
 from entropy_explore_env.robots.localization import LOCALIZATION_PARAMS
-from entropy_explore_env.robots.range_sensor import TeamSensors, team_sensors
+from entropy_explore_env.robots.range_sensor import SensorModel, team_sensors
 from entropy_explore_env.robots.rotations import directions_of
 from entropy_explore_env.settings.observation import Observation
 from entropy_explore_env.settings.robot import Robot
@@ -96,7 +96,8 @@ class Rules(NamedTuple):
 
     params: np.ndarray
     """(A,) PARAMS; what is not the robot's own is the same in all."""
-    sensors: TeamSensors
+    sensors: SensorModel
+    """Of the team."""
     actions: ActionSet
     cells: Cells
     """Of the overview; none without it."""

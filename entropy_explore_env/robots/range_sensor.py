@@ -42,7 +42,7 @@ SENSOR_PARAMS = record_type(
     [
         ("max_range_m", "f8"),
         ("min_range_m", "f8"),
-        ("noise_m", "f8"),
+        ("range_noise_m", "f8"),
         ("sigma_min", "f8"),
         ("sigma_slope_per_m", "f8"),
         ("sigma_exponent", "f8"),
@@ -51,29 +51,18 @@ SENSOR_PARAMS = record_type(
         ("rows", "i8"),
     ],
 )
-"""The parameters of a RangeSensor."""
+"""The parameters of a RangeSensor, by the names of its fields and properties."""
 
 
 class SensorModel(NamedTuple):
-    """A RangeSensor for compiled code."""
+    """A RangeSensor for compiled code, or those of A robots: with an axis A, padded to the largest one."""
 
     yaw_offsets: np.ndarray
     """(columns,) float64, relative to the gaze."""
     pitch_offsets: np.ndarray
     """(rows,) float64."""
     params: np.ndarray
-    """(1,) SENSOR_PARAMS."""
-
-
-class TeamSensors(NamedTuple):
-    """The RangeSensors of A robots for compiled code, padded to the largest one."""
-
-    yaw_offsets: np.ndarray
-    """(A, columns) float64, relative to the gaze."""
-    pitch_offsets: np.ndarray
-    """(A, rows) float64."""
-    params: np.ndarray
-    """(A,) SENSOR_PARAMS."""
+    """(1,) SENSOR_PARAMS, or (A,)."""
 
 
 class SensorPose(NamedTuple):
@@ -107,25 +96,21 @@ def true_coverage(occupied: np.ndarray, unreadable: np.ndarray | None) -> np.nda
 
 def sensor_model(sensor: RangeSensor) -> SensorModel:
     """Return what compiled code needs of the sensor's settings."""
-    params = np.zeros(1, SENSOR_PARAMS)
-    params["max_range_m"], params["noise_m"] = sensor.max_range_m, sensor.range_noise_m
-    params["min_range_m"] = sensor.min_range_m
-    params["sigma_min"], params["sigma_slope_per_m"] = sensor.sigma_min, sensor.sigma_slope_per_m
-    params["sigma_exponent"], params["voxels_behind"] = sensor.sigma_exponent, sensor.voxels_behind
-    params["columns"], params["rows"] = sensor.columns, sensor.rows
-    step = sensor.angular_step_rad
+    params, step = np.zeros(1, SENSOR_PARAMS), sensor.angular_step_rad
+    for name in SENSOR_PARAMS.names or ():
+        params[name] = getattr(sensor, name)
     return SensorModel(centred_angles(sensor.columns, step), centred_angles(sensor.rows, step), params)
 
 
-def team_sensors(sensors: Sequence[RangeSensor]) -> TeamSensors:
-    """Return what compiled code needs of the sensors of a team, robot by robot."""
+def team_sensors(sensors: Sequence[RangeSensor]) -> SensorModel:
+    """Return the SensorModel of a team, robot by robot."""
     models = [sensor_model(sensor) for sensor in sensors]
     columns, rows = (max(len(model[axis]) for model in models) for axis in (0, 1))
     yaws, pitches = np.zeros((len(models), columns)), np.zeros((len(models), rows))
     for robot, model in enumerate(models):
         yaws[robot, : len(model.yaw_offsets)] = model.yaw_offsets
         pitches[robot, : len(model.pitch_offsets)] = model.pitch_offsets
-    return TeamSensors(yaws, pitches, np.concatenate([model.params for model in models]))
+    return SensorModel(yaws, pitches, np.concatenate([model.params for model in models]))
 
 
 @inlined_kernel
@@ -170,11 +155,8 @@ def new_scan(grid: Grid, sensors: Sequence[RangeSensor], rays: int) -> Scan:
 
 def scan_bytes(grid: Grid, sensors: Sequence[RangeSensor], rays: int) -> int:
     """Return the bytes of the arrays of `new_scan`."""
-    longest = max(
-        longest_crossing(*grid.shape, sensor.max_range_m / grid.voxel_size_m, sensor.voxels_behind)
-        for sensor in sensors
-    )
-    return rays * (RAY.itemsize + 16 + 8 * longest) + 8 * longest
+    one = new_scan(grid, sensors, 1)
+    return rays * sum(array.nbytes for array in one) - (rays - 1) * one.entered.nbytes
 
 
 @inlined_kernel
@@ -260,7 +242,7 @@ def measure_ray(ray, params, scene, start, end, no_return, rng):
     """
     reach = params.max_range_m / scene.voxel_size_m
     ray.length, ray.range_m = end.length, end.length * scene.voxel_size_m
-    error = params.noise_m * draw_gaussian(rng) if params.noise_m > 0.0 else 0.0
+    error = params.range_noise_m * draw_gaussian(rng) if params.range_noise_m > 0.0 else 0.0
     ray.returned = _FREE if end.reason == OPEN else _HIT
     moved, direction = False, point(ray.direction)
     if no_return or (len(scene.bodies) > 0 and body_distance(start, direction, scene.bodies) < end.length):

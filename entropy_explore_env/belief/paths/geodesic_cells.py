@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.paths.bucket_queue import (
+    BUCKET_WIDTH,
     BucketQueue,
     advance,
     clear_queue,
@@ -32,8 +33,6 @@ from entropy_explore_env.errors import SettingError
 UNREACHED = -1
 """Cell of a voxel that no source reaches."""
 
-_BUCKET_WIDTH = 1.0 - 2.0**-20
-"""Width of a bucket in cheapest steps: below 1, so that rounding puts no step's ends into one bucket."""
 _SPACE_MOVES = 26
 _MAX_COST_RATIO = 1e9
 
@@ -140,7 +139,7 @@ def tessellate(
     margin = (1, 1, 0 if space.shape[2] == 1 else 1)
     places = np.stack(np.unravel_index(sources, traversal_cost.shape), axis=-1) + margin
     starts = (places @ np.array(space.strides)).astype(np.int64)
-    per_cost = 1.0 / (cheapest * _BUCKET_WIDTH)
+    per_cost = 1.0 / (cheapest * BUCKET_WIDTH)
     _tessellate(
         space, starts, steps, per_cost, None if space.shape[2] == 1 else _moves_in_space(space.strides)
     )
