@@ -40,10 +40,6 @@ class ActionChecker:
         self._count = int(space.n) if isinstance(space, spaces.Discrete) else 0
         self.width = 1 if isinstance(space, spaces.Discrete) else int(space.shape[0])
 
-    def one(self, name: str, action: object) -> tuple[np.ndarray, np.ndarray]:
-        """Return a single robot's action as ((1, N) float64, (1,) int64)."""
-        return self.batch([(name, action)])
-
     def batch(self, actions: Sequence[tuple[str, Any]]) -> tuple[np.ndarray, np.ndarray]:
         """Return a team's actions as arrays.
 

@@ -210,7 +210,7 @@ class EntropyExploreEnv(ParallelEnv[str, Any, Any]):
 
     def check_action(self, agent: str, action: Any) -> None:  # noqa: ANN401 - whatever was given
         """Raise an ActionError unless the agent can take this action."""
-        self._checker.one(agent, action)
+        self._checker.batch([(agent, action)])
 
     def _in_order(self, actions: Mapping[str, Any]) -> list[tuple[str, Any]]:
         """Return the actions in the order of the robots, if there is one for each."""

@@ -85,10 +85,6 @@ class FrontierRule(Driver):
         refines = self.refines and not scenario.ending.return_to_start  # all is seen, and may stay uncertain
         self._finest = min(scenario.ending.sigma_end, KNOWN_SIGMA) if refines else KNOWN_SIGMA
 
-    def cells_of(self, robot: int) -> VoxelFrontiers:
-        """Return the frontier cells of a robot; available after its first choice."""
-        return self._memories[robot].cells
-
     def observe(self, view: RobotKnowledge) -> None:
         """Bring the robot's cells up to date. Its memory is made at its first choice: see `new_cells`."""
         if view.robot not in self._memories:

@@ -26,8 +26,6 @@ STEP = 16
 CHANNELS = ("solid", "free", "outside")
 """What is told of a cell: shares of its voxels measured as covered and as free; 1 outside the workspace."""
 SOLID, FREE, OUTSIDE = range(len(CHANNELS))
-MOST_SHOWN = CELLS - STEP - 1
-"""Most cells along an axis, an odd number, that a crop holds with any place within it in the middle."""
 
 ROUNDING = 1e-6
 """A cell and a voxel overlap by more than this share of a cell; what is a multiple but for less, is one."""

@@ -30,9 +30,9 @@ def test_boxes_of_any_floating_type_are_taken(action: Any) -> None:
 
 
 def test_boxes_may_leave_the_space_by_rounding_alone() -> None:
-    BOX.one("robot_0", np.full(5, 1.0 + 5e-7))
+    BOX.batch([("robot_0", np.full(5, 1.0 + 5e-7))])
     with pytest.raises(ActionError):
-        BOX.one("robot_0", np.full(5, 1.0 + 5e-6))
+        BOX.batch([("robot_0", np.full(5, 1.0 + 5e-6))])
 
 
 @pytest.mark.parametrize("action", [6, np.int64(6), np.int8(6), np.array(6), np.uint64(6)])
@@ -84,7 +84,7 @@ NO_NUMBERS = (
 )
 def test_what_is_no_action_is_refused(checker: ActionChecker, action: Any, said: str) -> None:
     with pytest.raises(ActionError, match=said) as caught:
-        checker.one("robot_0", action)
+        checker.batch([("robot_0", action)])
     assert caught.value.field == "actions[robot_0]"
 
 

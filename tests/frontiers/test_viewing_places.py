@@ -225,7 +225,7 @@ def test_where_a_look_shows_nothing_the_robot_goes_on_to_the_cell_and_does_not_c
     for step, place in enumerate([(10, 5), (10, 4), (9, 4), (9, 3)]):
         walk.show_something((1 + step, 0))
         assert walk.goes(place) == (10, 6)
-    assert walk.rule.cells_of(0).is_frontier(int(number(walk.plan, (10, 6))))
+    assert walk.rule._memories[0].cells.is_frontier(int(number(walk.plan, (10, 6))))
 
 
 def test_where_the_drive_to_a_viewing_place_ends_early_the_robot_goes_to_the_cell_itself():

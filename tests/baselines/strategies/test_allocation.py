@@ -150,7 +150,7 @@ def test_allocation_is_the_paper_s_loop():
 def check_against_reference(missions, known):
     strategy, places = chosen(missions, 1.0)
     views = [view_of(missions, 0, robot) for robot in range(3)]
-    candidates = strategy.cells_of(0)
+    candidates = strategy._memories[0].cells
     voxels = candidates.listed()
     state = np.where(known, 0, 3)
     directions, reach = candidates._rays, candidates.reach

@@ -198,7 +198,7 @@ def test_synchronous_robots_over_terrain_wait_for_this_journey_and_no_other(navi
 @pytest.mark.parametrize("scenario", [small_plan(), small_terrain()])
 def test_where_a_robot_scanned_is_a_candidate_again_once_more_is_asked_for(scenario):
     env, explorer, _ = explored(scenario, 2)
-    candidates = explorer.cells_of(0)
+    candidates = explorer._memories[0].cells
     view = view_of(env.missions, 0, 0)
     candidates.readmit()
     candidates.update(view, 0.5)
