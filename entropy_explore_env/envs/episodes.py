@@ -11,8 +11,7 @@ import numpy as np
 
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
-from entropy_explore_env.missions.observation.layout import action_count
-from entropy_explore_env.missions.rules import rules_of
+from entropy_explore_env.missions.rules import action_count, rules_of
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.worlds.world import World

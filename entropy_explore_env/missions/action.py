@@ -26,7 +26,7 @@ from gymnasium import spaces
 
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.errors import ActionError
-from entropy_explore_env.missions.rules import Rules, rules_of
+from entropy_explore_env.missions.rules import Rules, action_count, rules_of
 from entropy_explore_env.settings.scenario import Scenario
 
 ROUNDING = 1e-6
@@ -37,10 +37,7 @@ def action_space(scenario: Scenario) -> spaces.Box | spaces.Discrete:
     """Return a new space object of one robot's action."""
     if scenario.action.kind == "continuous":
         return spaces.Box(-1.0, 1.0, (3 if scenario.planar else 5,), np.float32)
-    if scenario.action.kind == "candidates":
-        return spaces.Discrete(scenario.action.candidates)
-    rules = rules_of(scenario)
-    return spaces.Discrete(len(rules.actions.moves) * len(rules.actions.gazes))
+    return spaces.Discrete(action_count(scenario, rules_of(scenario)))
 
 
 @lean_kernel

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.missions.observation.layout import observation_parts
-from entropy_explore_env.missions.rules import discrete_moves, gaze_set, overview_shape
+from entropy_explore_env.missions.rules import action_count, overview_shape, rules_of
 from entropy_explore_env.missions.state import state_arrays
 from entropy_explore_env.prediction.predictor import scratch_bytes
 from entropy_explore_env.robots.range_sensor import scan_bytes
@@ -122,8 +122,7 @@ def _scratch_needs(scenario: Scenario, batch: Batch) -> list[Need]:
     predicting = scenario.observation.prediction * scratch_bytes()
     masks = 0
     if scenario.action.kind == "discrete":
-        gazes = gaze_set(scenario.action.yaws, 1 if scenario.planar else scenario.action.pitches)
-        masks = batch.missions * scenario.robots * len(discrete_moves(scenario)) * len(gazes)
+        masks = batch.missions * scenario.robots * action_count(scenario, rules_of(scenario))
     most = "threads" if batch.threads > 1 else None
     return [
         Need("rays of a scan", batch.threads * scans, most or "RangeSensor.angular_step_rad"),

@@ -116,7 +116,7 @@ class Rules(NamedTuple):
 def rules_of(scenario: Scenario) -> Rules:
     """Return the rules of a scenario."""
     ending, channel = scenario.ending, scenario.channel
-    bodies = collision_bodies(scenario)
+    bodies, pitches = collision_bodies(scenario), 1 if scenario.planar else scenario.action.pitches
     shared = {
         "size": scenario.grid.shape,
         "voxel_size_m": scenario.grid.voxel_size_m,
@@ -126,7 +126,7 @@ def rules_of(scenario: Scenario) -> Rules:
         "discrete": scenario.action.kind == "discrete",
         "proposed": scenario.action.kind == "candidates",
         "action_axes": 2 if scenario.planar else 3,
-        "pitches": 1 if scenario.planar else scenario.action.pitches,
+        "pitches": pitches,
         "bodies": len(bodies),
         "burst": min(channel.burst, max(kind.sensor.rays for kind in scenario.kinds)),
         "i_min_bits": channel.i_min_bits,
@@ -173,7 +173,6 @@ def rules_of(scenario: Scenario) -> Rules:
         for name in ("scan_time_s", "scan_every_m", "rays"):
             own[name] = getattr(sensor, name)
     overview, size = overview_shape(scenario), scenario.grid.shape
-    pitches = 1 if scenario.planar else scenario.action.pitches
     return Rules(
         params=params,
         sensors=team_sensors([scenario.kind_of(number).sensor for number in range(scenario.robots)]),
@@ -185,6 +184,13 @@ def rules_of(scenario: Scenario) -> Rules:
         slots=scenario.message_slots or None,
         repeats=channel.repeats if channel.phase_s > 0.0 else None,
     )
+
+
+def action_count(scenario: Scenario, rules: Rules) -> int:
+    """Return the number of actions where they are numbers."""
+    if scenario.action.kind == "candidates":
+        return scenario.action.candidates
+    return len(rules.actions.moves) * len(rules.actions.gazes)
 
 
 def fault_params(scenario: Scenario) -> np.ndarray | None:

@@ -15,7 +15,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 from entropy_explore_env.belief.raycast import Crossing, longest_crossing
-from entropy_explore_env.missions.observation.layout import action_count
+from entropy_explore_env.missions.rules import action_count
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.settings.changes import with_settings

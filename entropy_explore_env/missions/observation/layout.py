@@ -51,7 +51,7 @@ from entropy_explore_env.missions.observation.own_state import DRIVE_VALUES, SEL
 from entropy_explore_env.missions.observation.patch import PATCH_CHANNELS
 from entropy_explore_env.missions.observation.predicted import PREDICTION_CHANNELS
 from entropy_explore_env.missions.observation.team import TEAMMATE_VALUES
-from entropy_explore_env.missions.rules import Rules, overview_shape, rules_of
+from entropy_explore_env.missions.rules import Rules, action_count, overview_shape, rules_of
 from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
 from entropy_explore_env.settings.scenario import Scenario
 
@@ -188,13 +188,6 @@ def _candidate_parts(scenario: Scenario) -> dict[str, tuple[tuple[int, ...], flo
     if scenario.observation.overlaps:
         parts["overlaps"] = ((most, most), 0.0, one)
     return parts
-
-
-def action_count(scenario: Scenario, rules: Rules) -> int:
-    """Return the number of actions where they are numbers."""
-    if scenario.action.kind == "candidates":
-        return scenario.action.candidates
-    return len(rules.actions.moves) * len(rules.actions.gazes)
 
 
 def _most_utility_bits(scenario: Scenario, rules: Rules) -> float:
