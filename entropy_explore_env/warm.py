@@ -42,7 +42,8 @@ def main(words: Sequence[str]) -> int:
     args = _parser().parse_args(words)
     names = list(dict.fromkeys(args.scenarios)) or list(SCENARIOS)
     for name in names:
-        _check_name(name)
+        if name not in SCENARIOS:
+            raise SettingError("scenario", name, one_of(name, SCENARIOS))
     if not 1 <= args.processes <= _MAX_PROCESSES:
         raise SettingError("processes", args.processes, f"a whole number from 1 to {_MAX_PROCESSES}")
     folder = _writable_folder()
@@ -74,11 +75,6 @@ def _parser() -> argparse.ArgumentParser:
         "--processes", type=int, default=os.cpu_count() or 1, metavar="N", help="default: one for each core"
     )
     return parser
-
-
-def _check_name(name: str) -> None:
-    if name not in SCENARIOS:
-        raise SettingError("scenario", name, one_of(name, SCENARIOS))
 
 
 def _writable_folder() -> Path:

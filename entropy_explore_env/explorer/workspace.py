@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.belief.fields import Belief
+from entropy_explore_env.belief.paths.lattice import NO_FLY_NOWHERE
 from entropy_explore_env.belief.paths.search import Search
 from entropy_explore_env.explorer.canvas import Canvas
 from entropy_explore_env.missions.records import WAYPOINTS
@@ -21,7 +22,6 @@ from entropy_explore_env.viewpoints.evaluation import RobotModel, new_scratch, r
 from entropy_explore_env.viewpoints.expected_scan import expected_bits
 
 _POINTS_AT_ONCE = 4096
-_NO_CEILING = np.zeros(0, np.bool_)
 
 
 class Fused(NamedTuple):
@@ -144,7 +144,7 @@ class Workspace:
             corners = np.zeros((WAYPOINTS, 3))
             start, goal = tuple(here[:3].tolist()), tuple(at[:3].tolist())
             count, _ = plan_path(
-                self._navigators[number], belief.mean, belief.precision, _NO_CEILING, start, goal, corners
+                self._navigators[number], belief.mean, belief.precision, NO_FLY_NOWHERE, start, goal, corners
             )
             path = corners[:count]
         ends = np.vstack([here[None, :3], path])

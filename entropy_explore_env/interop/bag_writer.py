@@ -156,10 +156,6 @@ class BagWriter:
         stamp = self._make("builtin_interfaces/msg/Time", sec=sec, nanosec=nanosec)
         return self._make("std_msgs/msg/Header", stamp=stamp, frame_id=frame)
 
-    def _point(self, place: np.ndarray) -> Any:  # noqa: ANN401
-        x, y, z = (float(v) for v in place[:3])
-        return self._make("geometry_msgs/msg/Point", x=x, y=y, z=z)
-
     def _vector(self, x: float, y: float, z: float) -> Any:  # noqa: ANN401
         return self._make("geometry_msgs/msg/Vector3", x=float(x), y=float(y), z=float(z))
 
@@ -167,7 +163,9 @@ class BagWriter:
         """Return the geometry_msgs/Pose of a pose (5,)."""
         x, y, z, w = quaternion_of(float(pose[3]), float(pose[4]))
         turn = self._make("geometry_msgs/msg/Quaternion", x=x, y=y, z=z, w=w)
-        return self._make("geometry_msgs/msg/Pose", position=self._point(pose), orientation=turn)
+        x, y, z = pose[:3].tolist()
+        place = self._make("geometry_msgs/msg/Point", x=x, y=y, z=z)
+        return self._make("geometry_msgs/msg/Pose", position=place, orientation=turn)
 
     def _write_poses(self, time_s: float, poses: np.ndarray) -> None:
         """Write where all robots are, tf and odometry, and where the octomap is."""

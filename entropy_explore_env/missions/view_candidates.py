@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from entropy_explore_env.belief.paths.lattice import NO_FLY_NOWHERE
 from entropy_explore_env.belief.paths.search import Search
 from entropy_explore_env.missions.foresight import Foresight
 from entropy_explore_env.missions.proposals import Known, locate, propose_to
@@ -15,8 +16,6 @@ from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE, Kind
 from entropy_explore_env.planner.thresholds import NO_GAIN_BITS
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.expected_scan import MOST_SCANS, UNPREDICTED, ScanScratch
-
-_NO_CEILING = np.zeros(0, np.bool_)
 
 
 class ViewProposer:
@@ -102,7 +101,7 @@ class ViewProposer:
             view.heard.copy(),
             writable(view.mean),
             writable(view.precision),
-            _NO_CEILING if no_fly is None else no_fly.reshape(-1),
+            NO_FLY_NOWHERE if no_fly is None else no_fly.reshape(-1),
             self._candidates[robot],
             self._experience[robot],
         )

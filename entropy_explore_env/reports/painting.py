@@ -9,11 +9,12 @@ import numpy as np
 from gymnasium import logger
 
 from entropy_explore_env.errors import SettingError, did_you_mean
+from entropy_explore_env.missions.faults import failing
 from entropy_explore_env.missions.localization import pose_errors
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.reports.animation import Window
 from entropy_explore_env.reports.projection import shares_left
-from entropy_explore_env.reports.recording import DrivenPaths, believed_poses_now, poses_now, stopped_now
+from entropy_explore_env.reports.recording import DrivenPaths, believed_poses_now, poses_now
 from entropy_explore_env.reports.rendering import Frame, draw_frame
 from entropy_explore_env.worlds.given import GIVEN
 from entropy_explore_env.worlds.recipes.catalogue import RECIPES
@@ -127,7 +128,7 @@ class Painter:
         poses = believed_poses_now(missions, self._number)
         drifts, estimates = missions.scenario.drifts, missions.state.estimates[self._number]
         shares = np.stack(self._shares) if self._shares else np.zeros((0, len(robots)))
-        stopped = stopped_now(missions, self._number)
+        stopped = failing(missions.state.faults[self._number], time_s)["stopped"]  # (0,) without faults
         summaries = missions.scenario.channel.content == "summaries"
         sent = ("bits", "bits_sent") if summaries else ("rays", "measurements_sent")
         status = (

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from entropy_explore_env.missions.faults import failing
 from entropy_explore_env.missions.localization import believed_pose
 from entropy_explore_env.missions.poses import place_at, pose_at
 from entropy_explore_env.missions.simulation import Missions
@@ -21,14 +20,6 @@ def poses_now(missions: Missions, mission: int) -> np.ndarray:
     time_s = float(missions.state.missions[mission]["time_s"])
     numbers, robots = missions.rules.params, missions.state.robots[mission]
     return np.stack([np.array(pose_at(numbers[a], robot, time_s)) for a, robot in enumerate(robots)])
-
-
-def stopped_now(missions: Missions, mission: int) -> np.ndarray:
-    """Return (A,) bool, which of a mission's robots a fault has stopped."""
-    if not missions.scenario.faults.happen:
-        return np.zeros(missions.scenario.robots, bool)
-    time_s = float(missions.state.missions[mission]["time_s"])
-    return failing(missions.state.faults[mission], time_s)["stopped"]
 
 
 def believed_poses_now(missions: Missions, mission: int) -> np.ndarray:
