@@ -86,7 +86,7 @@ policy: $(STAMP)training
 
 # The predictor of maps that comes with the library; a stopped run goes on. Dungeons are fetched.
 predictor: $(STAMP)training
-	$(RUN) training.map_predictor --missions 90 --validation-missions 12 --epochs 26 --threads 1 --out runs/map-predictor
+	$(RUN) training.map_predictor --missions 90 --validation-missions 12 --epochs 26 --threads 1 --device cpu --out runs/map-predictor
 
 reliability: $(STAMP)dev
 	$(RUN) benchmarks.proofs --full --out docs/results/reliability.md

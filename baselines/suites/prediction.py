@@ -106,7 +106,7 @@ class LeftOut(PlannedRate):
         file = Path("runs") / f"without-{recipe}" / "predictor.safetensors"
         if not file.is_file():
             trained = f"python -m training.map_predictor --leave-out {recipe} --out {file.parent}"
-            raise SettingError("strategy", "LeftOut", f"{file}, which `{trained}` writes")
+            raise SettingError("strategy", "LeftOut", f"{file}, which `{trained}` writes; then --rerun")
         self._predictor = read_predictor(file)
         super().reset(scenario, rng)
 

@@ -70,10 +70,10 @@ def _insert(worths, options, at, worth, count):
 
 
 @lean_kernel
-def _least_seconds(proposer, situation, block, searched, at):
-    """Return the least seconds to a place in a block (i, j, k); `at` (5,) is overwritten.
+def _seconds_bound(proposer, situation, block, searched, at):
+    """Return a lower bound of the seconds to a place in a block (i, j, k); `at` (5,) is overwritten.
 
-    They are those of a straight way, or of one longer than what was `searched`.
+    It is that of a straight way, or of one longer than what was `searched`.
     """
     here, lattice, squared = situation.knowledge.pose, proposer.lattice, 0.0
     low, high = block_bounds(proposer.blocks, situation.belief.size, block[0], block[1], block[2])
@@ -95,7 +95,7 @@ def _fill_far(proposer, situation, state, searched, options):
 
     Returns:
         (count, beyond): how many viewpoints these are, and whether a place farther than what was `searched`
-        could be one of them.
+        could be one of them, as far as costs up to there are final.
     """
     scratch, blocks, recipe, drive = proposer.scratch, proposer.blocks, proposer.recipe, proposer.drive
     here, window, at = situation.knowledge.pose, blocks.window, scratch.at
@@ -109,12 +109,12 @@ def _fill_far(proposer, situation, state, searched, options):
                 if bits <= 0.0:
                     continue
                 if state != _DEPLETED and count == len(worths):
-                    least_s = _least_seconds(proposer, situation, (i, j, k), 0.0, at)
+                    least_s = _seconds_bound(proposer, situation, (i, j, k), 0.0, at)
                     if value_of(proposer, situation, bits, least_s) <= worths[count - 1]:
                         continue
                 place = place_of(paths, blocks, i, j, k)
                 if place == NOT_REACHED:
-                    least_s = _least_seconds(proposer, situation, (i, j, k), searched, at)
+                    least_s = _seconds_bound(proposer, situation, (i, j, k), searched, at)
                     beyond = max(beyond, value_of(proposer, situation, bits, least_s))
                 elif place != NOT_FREE:
                     _put_at(proposer, situation, place, at)
@@ -134,29 +134,9 @@ def _fill_far(proposer, situation, state, searched, options):
 
 
 @lean_kernel
-def _most_worth(proposer, situation, options):
-    """Bring those of some far viewpoints to the front that drawn rays find worth most; return how many."""
-    most = proposer.recipe.far_exact
-    if len(options) <= most:
-        return len(options)
-    evaluate(proposer, situation, proposer.drawn, options, True)
-    for place in range(most):
-        best = place
-        for other in range(place + 1, len(options)):
-            if options[other].value > options[best].value:
-                best = other
-        copy_numbers(options[best].viewpoint, proposer.scratch.at)
-        copy_numbers(options[place].viewpoint, options[best].viewpoint)
-        copy_numbers(proposer.scratch.at, options[place].viewpoint)
-        options[best].value = options[place].value
-    return most
-
-
-@lean_kernel
 def _evaluate_far(proposer, situation, count):
     """Evaluate some far viewpoints, and the robot's goal as the last one; return (count, best value)."""
     far, experience, best = proposer.scratch.far, situation.experience, 0.0
-    count = _most_worth(proposer, situation, far[:count])
     if experience.going:
         copy_numbers(experience.goal, far[count].viewpoint)
         count += 1

@@ -22,7 +22,7 @@ class Recipe(NamedTuple):
     gap_probability: float  # probability that an unknown voxel beside a covered one stops an imagined ray
     draw_thinning: int
     """One in this many columns, and rows, of the sensor's rays is imagined for viewpoints that are drawn; for
-    those that are refined, and for the best far places, all rays are."""
+    those that are refined, and for far places, all rays are."""
     gazes: int  # viewpoints that are drawn around the present gaze, on the spot
     turns: int  # viewpoints that are drawn on the spot with any gaze
     places: int  # viewpoints that are drawn within reach with any gaze
@@ -30,7 +30,6 @@ class Recipe(NamedTuple):
     refined: int = 12  # viewpoints that are drawn in each refinement
     far_places: int = 24  # known free places that are evaluated beyond those within reach
     far_gazes: int = 1  # gazes that are evaluated at each far place
-    far_exact: int = 1000  # of these, how many are evaluated with all rays: the best with the rays of draws
     waypoint_gazes: int = 1  # gazes that are evaluated at a stop on the way to a far place
     far_below: float = 1.0
     """Far places are looked for where the best viewpoint nearby brings less than this share of the most bits
@@ -60,7 +59,7 @@ ALL_AROUND = Recipe(
 """Scanners that see all around: they choose places, not gazes."""
 
 MANY_RAYS = 2000
-"""Number of rays from which on ALL_AROUND imagines one in two columns and rows of them first."""
+"""Number of rays from which on ALL_AROUND imagines one in two columns and rows where viewpoints are drawn."""
 
 NARROW_PLANNED = Recipe(
     exponent=1.0,
@@ -100,9 +99,7 @@ NARROW_STRAIGHT = Recipe(
 def recipe_for(kind: RobotKind) -> Recipe:
     """Return the recipe of a kind of robot."""
     if sees_all_around(kind.sensor):
-        return (
-            ALL_AROUND if kind.sensor.rays < MANY_RAYS else ALL_AROUND._replace(draw_thinning=2, far_exact=6)
-        )
+        return ALL_AROUND if kind.sensor.rays < MANY_RAYS else ALL_AROUND._replace(draw_thinning=2)
     return NARROW_PLANNED if kind.robot.navigator == "planned" else NARROW_STRAIGHT
 
 

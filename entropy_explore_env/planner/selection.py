@@ -83,8 +83,7 @@ def _take(proposer, situation, number, count, marked, most_common):
     if not look_from(proposer, situation, option.goal, count, most_common):
         return count, marked
     scratch.taken[count] = number
-    if len(scratch.taken) > 1:  # a single candidate is compared with none
-        marked = mark_view(proposer, belief, count, marked)
+    marked = mark_view(proposer, belief, count, marked)
     if option.seconds < math.inf:  # put what all rays should bring in place of what fewer should
         option.bits = worth_bits(proposer, situation, option.goal, scratch.views[count].bits)
         option.value = value_of(proposer, situation, option.bits, option.seconds)

@@ -141,7 +141,7 @@ class RobotKnowledge:
         return self.predicted_by(shipped_predictor())
 
     def predicted_by(self, predictor: Predictor) -> Prediction:
-        """Return the same of another predictor: see `prediction`."""
+        """Return what a predictor says of the cells around the robot: see `prediction`."""
         grid, radius_m = self.scenario.grid, self.kind.robot.body_radius_m
         known = (self.mean, self.precision, self.scenario.sigma_prior)
         return predictor.predict(grid, *known, self.pose, radius_m)

@@ -196,19 +196,20 @@ def test_between_cells_the_search_ends_where_no_place_beyond_could_promise_more(
     assert (staged >= scratch.worth[:3] * (1.0 - 1e-9)).all()
 
 
-def test_of_far_places_those_that_drawn_rays_find_worth_most_are_evaluated_with_all():
-    values = {}
-    for far_exact in (2, 1000):
-        recipe = ALL_AROUND._replace(draw_thinning=2, far_exact=far_exact)
-        proposer, situation = new_proposers(PLAN, recipe)[0], half_known_plan(most_bits=1e9)
-        start_paths(proposer, situation)
-        count, best = propose_far(proposer, situation, EXPLORING)
-        far = proposer.scratch.far[:count].copy()
-        assert best == far["value"].max() and count == min(far_exact, count)
-        values[far_exact] = {tuple(each["viewpoint"]): each["value"] for each in far}
-    assert len(values[2]) == 2 < len(values[1000]) and values[2].items() <= values[1000].items()
-    ranked = sorted(values[1000].values())
-    assert max(values[2].values()) >= ranked[-3]
+@pytest.mark.parametrize(("state", "goes"), [(EXPLORING, True), (int(PlannerState.DEPLETED), False)])
+def test_between_cells_the_search_goes_on_to_the_goal_or_everywhere_in_a_depleted_planner(state, goes):
+    """All that is unknown is near, so that an exploring planner without a goal searches no farther."""
+    proposer, shape = new_proposers(HALL, ALL_AROUND._replace(far_places=3))[0], HALL.grid.shape
+    precision = np.full(shape, 2000.0)
+    precision[60:80, :8] = UNKNOWN
+    here, far_end = (np.array([x, 15.5, 10.5, 0.3, 0.0]) for x in (6.5, 164.5))
+    situation = situation_of(HALL, np.zeros(shape), precision, here, most_bits=1e9)
+    situation.experience["going"], situation.experience["goal"] = goes, far_end
+    start_paths(proposer, situation)
+    count, _ = propose_far(proposer, situation, state)
+    assert count == 3 + goes and cost_of(proposer, situation, far_end) < math.inf
+    if goes:
+        assert proposer.scratch.far["seconds"][count - 1] < math.inf
 
 
 def test_the_first_stop_on_the_way_is_within_reach_and_free(far):

@@ -42,7 +42,7 @@ from training.map_scores import (
 RECIPES_HERE = ("cluttered", "corridor")
 TINY = (
     f"--recipes {' '.join(RECIPES_HERE)} --missions 1 --validation-missions 1 --snapshots 3 --epochs 2 "
-    "--batch 2 --seed 1 --threads 1 --jobs 1 --json"
+    "--batch 2 --seed 1 --threads 1 --device cpu --jobs 1 --json"
 )
 
 
@@ -182,6 +182,8 @@ def test_a_recipe_that_is_left_out_is_told_of_and_not_learned(started, monkeypat
         ("--rate inf", "rate = inf"),
         ("--device tpu", "device = 'tpu': expected auto, cpu"),
         ("--device cuda:99", "device = 'cuda:99'"),
+        ("--device meta", "device = 'meta'"),
+        ("--device hpu", "device = 'hpu'"),
         ("--weights missing.safetensors", "No such file"),
     ],
 )
