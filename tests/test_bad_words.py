@@ -75,7 +75,7 @@ REFUSED = {
         ("--rerun --since HEAD", "since = 'HEAD'"),
         ("--since nowhere", "since = 'nowhere'"),
         ("--archive nowhere.jsonl.xz", "nowhere.jsonl.xz"),
-        ("--out FLOOR/below", "floor.pgm/below.*a file of rows that can be read"),
+        ("--out FLOOR/below", "floor.pgm/below.*a folder that can be made"),
         ("--out /proc/nowhere", "out = '/proc/nowhere': expected a folder"),
     ],
     "baselines.films": [
