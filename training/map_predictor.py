@@ -134,7 +134,8 @@ def main(words: Sequence[str]) -> int:
     every_nth = max(len(samples.truth) // _NEAREST_SAMPLES, 1)
     shares = nearest_shares(Samples(*(values[::every_nth] for values in samples)))
     figures = figures_of(scored(*validation, predicted, shares))
-    told = {name: getattr(args, name) for name in (*_OPTIONS, "threads", "device")}
+    told = {name: getattr(args, name) for name in (*_OPTIONS, "threads")}
+    told["device"] = str(device_of(args))
     told |= {"weights": None if args.weights is None else args.weights.name, "version": VERSION}
     told |= {"samples": len(samples.truth), "validation_samples": len(validation[1])}
     results = {"options": told, "figures": figures}
