@@ -13,9 +13,10 @@ import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+import torch
 
 from baselines.cli.interruption import Interruption
 from baselines.experiments.mission import run_mission, scripted_env
@@ -26,12 +27,14 @@ from baselines.suites.public_worlds import in_world
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.prediction.crop import FREE, OUTSIDE, SOLID, around, pool_crop
+from entropy_explore_env.prediction.crop import OUTSIDE, SOLID, around, pool_crop
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import SCENARIOS
 from entropy_explore_env.writing import write_atomically
 from training.checkpoints import stored_arrays, stored_bytes
+
+_Numbers = TypeVar("_Numbers", np.ndarray, torch.Tensor)
 
 RECIPES = ("office", "corridor", "cluttered", "hybrid", "dungeon")
 """What worlds are sampled from."""
@@ -187,9 +190,9 @@ def read_samples(folder: Path, missions: Iterable[Sampled]) -> tuple[Samples, np
     return Samples(np.concatenate(cells), np.concatenate(truths)), np.array(recipes)
 
 
-def unmeasured(cells: np.ndarray) -> np.ndarray:
+def unmeasured(cells: _Numbers) -> _Numbers:
     """Return (N, C, C) bool, the cells of a workspace in which nothing was measured, from (N, 3, C, C)."""
-    return (cells[:, SOLID] == 0) & (cells[:, FREE] == 0) & (cells[:, OUTSIDE] == 0)
+    return (cells == 0).all(1)  # pyright: ignore[reportReturnType] - of arrays and of tensors alike
 
 
 def as_channels(cells: np.ndarray) -> np.ndarray:

@@ -151,6 +151,18 @@ def _figures(cells: Scored) -> dict[str, Any]:
     }
 
 
+def table_text(figures: dict[str, Any], left_out: str | None) -> str:
+    """Return the figures as a table."""
+    lines = [f"{'validation':<22}{'cells':>10}{'solid':>8}{'base':>8}{'nearest':>9}{'network':>9}{'ECE':>8}"]
+    for name, row in figures.items():
+        shown = f"{name} (left out)" if name == left_out else name
+        bits = f"{row['base_rate_bits']:>8.3f}{row['nearest_bits']:>9.3f}{row['predicted_bits']:>9.3f}"
+        lines.append(
+            f"{shown:<22}{row['cells']:>10,}{row['solid']:>8.3f}{bits}{row['calibration_error']:>8.4f}"
+        )
+    return "\n".join([*lines, "log loss in bits a cell; ECE = expected calibration error"])
+
+
 def draw_figure(
     file: Path, samples: Samples, recipes: np.ndarray, predicted: np.ndarray, figures: dict[str, Any]
 ) -> None:
