@@ -90,8 +90,10 @@ class KnownPaths:
     def nearest_frontiers(self) -> tuple[np.ndarray, np.ndarray]:
         """Return (K,) frontier cells and lengths, one a block, among them the nearest of all."""
         while True:
+            if self.exhausted():
+                return self.frontiers_within(math.inf)
             voxels, lengths = self._cells.nearest_of_blocks(self.lengths_to, self.reach)
-            if len(voxels) or self.exhausted():
+            if len(voxels):
                 return voxels, lengths
             self.extend(_EXTENSION * self.reach)
 

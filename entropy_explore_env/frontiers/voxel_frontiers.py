@@ -24,6 +24,7 @@ from entropy_explore_env.frontiers.blocks import (
     replace_unreached,
 )
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig, FrontierMap
+from entropy_explore_env.frontiers.groups import fill_groups, keep_large
 from entropy_explore_env.frontiers.visibility import (
     count_crossed,
     count_from,
@@ -48,9 +49,12 @@ from entropy_explore_env.frontiers.voxel_states import COVERED, UNMAPPED, new_st
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.viewpoints.evaluation import cell_edge
 
 BLOCK = 4
 """Voxels along the edge of a block, unless settings say otherwise."""
+LEAST_GROUP_M2 = 2.5
+"""Smallest group of frontier voxels to which drones go in fine grids while there are larger ones."""
 
 
 class VoxelFrontiers(FrontierMap):
@@ -73,6 +77,11 @@ class VoxelFrontiers(FrontierMap):
         ball = math.pi * wide**2 if self._size[2] == 1 else 4.0 / 3.0 * math.pi * wide**3
         self._most = min(ball, float(scenario.grid.voxels))
         self._radius, self._sight = self.body_reach + 2, (self.reach + 2.0, 1.0)
+        self._least = math.ceil(LEAST_GROUP_M2 / edge**2) if cell_edge(scenario, kind) > 1 else 1
+        """Voxels of the smallest large group."""
+        self._groups = np.zeros(scenario.grid.voxels if self._least > 1 else 0, np.uint8)
+        self._grouped = False
+        """Whether `_groups` are those of the edges as they are."""
         self._dropped: dict[int, tuple[bytes, np.ndarray]] = {}
         """Voxel → what its surroundings were when it was dropped, and which edges were dropped with it."""
 
@@ -80,6 +89,7 @@ class VoxelFrontiers(FrontierMap):
         """See `FrontierMap`; dropped cells count again where the map has changed around them."""
         super().update(view, sigma)
         if self.changed:
+            self._grouped = False
             for voxel in [v for v, (was, _) in self._dropped.items() if self._surroundings(v) != was]:
                 self._restore(voxel)
 
@@ -90,6 +100,7 @@ class VoxelFrontiers(FrontierMap):
     def _find_candidates(self) -> None:
         """See `FrontierMap`."""
         update_blocks(self._blocks, self._costs)
+        self._grouped = False
 
     def replace_unreached(self, cost: np.ndarray) -> None:
         """See `FrontierMap`."""
@@ -168,20 +179,41 @@ class VoxelFrontiers(FrontierMap):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Find the frontier cell with the shortest path in each block.
 
+        In fine grids, drones find those at large groups of frontier voxels, if there are any.
+
         Args:
             lengths_to: (N,) int32 voxels → (N,) lengths of the paths to them; inf = no path.
-            reach: Cells with longer paths are left out; inf allowed.
+            reach: Cells with longer paths are left out, and those at small groups; inf = none are.
 
         Returns:
             (K,) int32 voxels and (K,) float64 lengths in voxel edges, in the order of the blocks.
         """
+        if self._least > 1:
+            found = self._nearest_of_blocks(lengths_to, reach, only_large=True)
+            if len(found[0]) or math.isfinite(reach):
+                return found
+        return self._nearest_of_blocks(lengths_to, reach, only_large=False)
+
+    def _nearest_of_blocks(
+        self, lengths_to: Callable[[np.ndarray], np.ndarray], reach: float, only_large: bool
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return what `nearest_of_blocks` does, at large groups alone or at all."""
         cells, of_block = np.empty((2, len(self._marks)), np.int32)
         count = collect_candidates(self._blocks, cells, of_block)
+        if only_large:
+            self._group()
+            count = keep_large(self._blocks, self._groups, cells, of_block, count)
         cells, of_block = cells[:count], of_block[:count]
         lengths, nearest = lengths_to(cells), np.full(len(self._voxels), NONE)
         fill_nearest(lengths, of_block, reach, nearest)
         nearest = nearest[nearest != NONE]
         return cells[nearest], lengths[nearest]
+
+    def _group(self) -> None:
+        """Find the groups, unless the edges are as they were."""
+        if not self._grouped:
+            fill_groups(self._blocks, self._least, np.empty(len(self._marks), np.int32), self._groups)
+            self._grouped = True
 
     def drop(self, voxel: int, with_edges: bool) -> None:
         """Take out a frontier cell until the map changes around it.

@@ -1,0 +1,103 @@
+"""Groups of frontier voxels: beside SciPy's labels, and how drones in fine grids choose among them."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import ndimage
+
+from baselines.strategies.rules.nearest_frontier import NearestFrontier
+from entropy_explore_env.belief.paths.search import new_search
+from entropy_explore_env.frontiers import voxel_frontiers
+from entropy_explore_env.frontiers.blocks import DROPPED, EDGE, NONE, new_blocks
+from entropy_explore_env.frontiers.groups import LARGE, fill_groups, keep_large
+from entropy_explore_env.frontiers.path_lengths import KnownPaths
+from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
+from entropy_explore_env.frontiers.voxel_map import body_footprint
+from entropy_explore_env.planner.frontier_rule import Scene
+from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import OFFICE_3D
+from entropy_explore_env.viewpoints import evaluation
+from tests.reference.scenes import drawn, seeds
+
+DRONE = with_settings(
+    OFFICE_3D,
+    {"grid": Grid((60, 20, 12), 0.1), "robots": 1, "robot": {"body_radius_m": 0.3, "reach_m": 3.0}},
+)
+
+
+@given(st.sampled_from([(9, 6, 7), (5, 11, 8), (13, 9, 1)]), st.integers(1, 9), st.floats(0.05, 0.4), seeds)
+@drawn(40)
+def test_groups_are_scipys_labels_and_cells_are_kept_that_touch_a_large_one(shape, least, share, seed):
+    rng = np.random.default_rng(seed)
+    layer = 0 if shape[2] == 1 else None
+    state = np.zeros(math.prod(shape), np.uint8)
+    blocks = new_blocks(shape, state, body_footprint(shape, 1.3, layer), layer, 3)
+    edge, dropped = rng.random(shape) < share, rng.random(shape) < 0.2
+    blocks.flags[edge.ravel()] |= EDGE
+    blocks.flags[dropped.ravel()] |= DROPPED
+    blocks.edges[:] = 1
+    labels, _ = ndimage.label(edge & ~dropped, np.ones((3, 3, 3)))
+    large = (np.bincount(labels.ravel())[labels] >= least) & (labels > 0)
+    groups = rng.integers(0, 4, len(state)).astype(np.uint8)  # of a map before this one
+    fill_groups(blocks, least, np.empty(len(state), np.int32), groups)
+    np.testing.assert_array_equal((groups & LARGE > 0).reshape(shape), large)
+
+    cells = rng.permutation(len(state)).astype(np.int32)
+    kept, of_block = cells.copy(), cells.copy()
+    count = keep_large(blocks, groups, kept, of_block, len(cells))
+    body = np.zeros((2 * blocks.reach + 1,) * 3, bool)
+    body[tuple((blocks.footprint + blocks.reach).T)] = True
+    touching = ndimage.binary_dilation(large, body).ravel()
+    assert kept[:count].tolist() == of_block[:count].tolist() == cells[touching[cells]].tolist()
+
+
+def hall(unknown):
+    """A hall that a drone at (15, 10, 6) knows, but for boxes of voxels; cells of two voxels."""
+    mean, precision = (
+        np.full(DRONE.grid.shape, 0.05, np.float32),
+        np.full(DRONE.grid.shape, 100.0, np.float32),
+    )
+    for low, high in unknown:
+        precision[tuple(slice(*ends) for ends in zip(low, high, strict=True))] = 30.0**-2
+    view = SimpleNamespace(
+        mean=mean, precision=precision, scenario=DRONE, teammates={}, robot=0, since_scan_m=0.0
+    )
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(evaluation, "_CELLS_WITHIN", 7)
+        patched.setattr(voxel_frontiers, "LEAST_GROUP_M2", 0.5)
+        assert evaluation.cell_edge(DRONE, DRONE.kind_of(0)) == 2
+        cells = VoxelFrontiers(DRONE, DRONE.kind_of(0))
+        paths = KnownPaths(DRONE, DRONE.kind_of(0), cells, new_search(DRONE.grid.voxels))
+    cells.update(view, 0.5)  # type: ignore[arg-type]
+    here = int(np.ravel_multi_index((15, 10, 6), DRONE.grid.shape))
+    paths.start(here)
+    return Scene(view, cells, paths, here, NONE, NONE)  # type: ignore[arg-type]
+
+
+def test_drones_go_to_a_large_group_past_a_small_one_and_to_small_ones_at_last_by_hand():
+    sliver, wall = ((15, 1, 4), (16, 2, 8)), ((50, 0, 0), (60, 20, 12))
+    scene = hall([sliver, wall])
+    x, y, _ = np.unravel_index(NearestFrontier().pick(scene), DRONE.grid.shape)
+    assert x == 46  # the body, of three voxels, touches the last known ones at 49
+    assert len(scene.paths.frontiers_within(20.0)[0]) == 0 and len(scene.paths.frontiers_within(40.0)[0]) > 0
+    x, y, _ = np.unravel_index(NearestFrontier().pick(hall([sliver])), DRONE.grid.shape)
+    assert abs(x - 15) <= 4 and y <= 6
+
+
+def test_a_group_that_is_dropped_is_large_no_longer_by_hand():
+    sliver, wall = ((15, 1, 4), (16, 2, 8)), ((50, 0, 0), (60, 20, 12))
+    scene = hall([sliver, wall])
+    while True:
+        x, _, _ = np.unravel_index(NearestFrontier().pick(scene), DRONE.grid.shape)
+        if x < 40:
+            break
+        scene.cells.drop(int(NearestFrontier().pick(scene)), with_edges=True)
+        scene.paths.start(scene.here)
+    assert abs(x - 15) <= 4
