@@ -6,6 +6,8 @@ more than every viewpoint nearby, along the shortest path by the robot's belief,
 every stop. What a robot is, and what its mission asks for, decides how it explores:
 
 - Flying robots, and all in 3-D worlds: bits per time, with the recipe of narrow or of wide views.
+- Drones that scan in flight, in grids that are fine for them, in missions that end by what was seen: the
+  same, and what is left at last, on tours.
 - Ground robots with a scanner that sees all around, in a plan, until the map has a given entropy: bits per
   time, of scans imagined in a predicted map where much is predicted solid (`missions.foresight`).
 - The same robots where everything is to be seen: frontier cells on short tours, see `planner.tour`.
@@ -19,6 +21,8 @@ that are left, and then home.
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from collections.abc import Callable
 
 import numpy as np
@@ -32,10 +36,13 @@ from entropy_explore_env.planner.weights import PlannerWeights
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
-from entropy_explore_env.viewpoints.evaluation import sees_all_around
+from entropy_explore_env.viewpoints.evaluation import cell_edge, sees_all_around
 
 _EVERYTHING = 0.995
 """Share of what can be seen from which on every corner must be seen."""
+_LATELY_S = 20.0
+_LITTLE = 0.2
+"""A drone goes on tours once it gained less, a second, than this share of its mission's mean."""
 
 
 def explores_frontiers(scenario: Scenario, kind: RobotKind) -> bool:
@@ -52,6 +59,34 @@ def _wants_everything(scenario: Scenario, kind: RobotKind) -> bool:
         return ending.seen_share >= _EVERYTHING
     unseen = 0 if ending.unseen_free_voxels is None else ending.unseen_free_voxels
     return unseen < kind.sensor.max_range_m / scenario.grid.voxel_size_m
+
+
+def ends_on_tours(scenario: Scenario, kind: RobotKind) -> bool:
+    """Return whether robots of a kind go for frontier cells once they gain little.
+
+    Drones that scan in flight do, in grids of which several voxels make a cell of their paths. By bits per
+    time they would cross the world for each of the slivers between rays that are left.
+    """
+    scans_in_flight = sees_all_around(kind.sensor) and math.isfinite(kind.sensor.scan_every_m)
+    return scenario.ending.by_seen and scans_in_flight and cell_edge(scenario, kind) > 1
+
+
+class _Gains:
+    """What a robot gained lately."""
+
+    def __init__(self) -> None:
+        """Begin a mission."""
+        self._past: deque[tuple[float, float]] = deque()
+        """Time, and bits gained until then, at the decisions of the last _LATELY_S seconds and one before."""
+
+    def are_low(self, view: RobotView) -> bool:
+        """Return whether the robot gains little now, at one of its decisions."""
+        self._past.append((view.time_s, view.gained_bits))
+        while len(self._past) > 1 and view.time_s - self._past[1][0] >= _LATELY_S:
+            self._past.popleft()
+        since_s, before = self._past[0]
+        seconds, gained = view.time_s - since_s, view.gained_bits - before
+        return seconds >= _LATELY_S and gained / seconds < _LITTLE * view.gained_bits / view.time_s
 
 
 class PlannedRate:
@@ -75,8 +110,11 @@ class PlannedRate:
         self._by_frontiers = [weights is None and explores_frontiers(scenario, kind) for kind in kinds]
         """Whether each robot goes for frontier cells, and home when there are none."""
         self._returns = scenario.ending.return_to_start
+        ends = [weights is None and ends_on_tours(scenario, kind) for kind in kinds]
+        self._gains = {robot: _Gains() for robot, on_tours in enumerate(ends) if on_tours}
+        """Robot → what it gained lately, of those that end on tours."""
         self._parts: list[SharedTour | ViewProposer] = []
-        if any(self._by_frontiers) or self._returns:
+        if any(self._by_frontiers) or self._returns or self._gains:
             self._tours = SharedTour()
             self._tours.backs_off = False  # whatever the planner chooses is followed so
             self._tours.reset(scenario, rng)
@@ -103,6 +141,8 @@ class PlannedRate:
 
     def choose(self, view: RobotView) -> np.ndarray:
         """Return the viewpoint (5,) by the robot's own belief and what it has heard."""
+        if view.robot in self._gains and self._gains[view.robot].are_low(view):
+            self._by_frontiers[view.robot] = True
         if self._by_frontiers[view.robot]:
             return self._tours.choose(view)
         proposed = self._proposer.propose(view)

@@ -52,7 +52,7 @@ class _Memory:
     viewpoint: np.ndarray | None = None
     """(5,) on the way to the goal, chosen last."""
     scanned: bool = False
-    """Whether the first scan was taken."""
+    """Whether the first scan was taken; robots under way have scanned."""
     gazes: int = 0
     """Number of directions in which it has looked from where it stands."""
 
@@ -141,8 +141,8 @@ class FrontierRule(Driver):
     def decide(self, view: RobotKnowledge) -> np.ndarray | None:
         """Return the viewpoint on the way to the rule's goal; see `Driver`."""
         memory, here = self._memories[view.robot], voxel_of(view, view.pose)
-        if not memory.scanned:
-            memory.scanned = True
+        first, memory.scanned = not memory.scanned, True
+        if first and not view.under_way:
             gaze = None if self.turns_first else (float(view.pose[3]), float(view.pose[4]))
             return self._look(view, memory, view.pose, gaze)
         target, place, _, gaze = memory.goal

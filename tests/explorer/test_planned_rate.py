@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from baselines.experiments.mission import run_mission, scripted
 from baselines.strategies.rules.nearest_frontier import NearestFrontier
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.explorer.planned_rate import PlannedRate
+from entropy_explore_env.explorer import planned_rate
+from entropy_explore_env.explorer.planned_rate import PlannedRate, ends_on_tours
 from entropy_explore_env.missions.view_candidates import ViewProposer
 from entropy_explore_env.reports.metrics import mission_figures
 from entropy_explore_env.settings.changes import with_settings
-from entropy_explore_env.settings.scenarios import ROOM, SCENARIOS, find_scenario
+from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.scenarios import OFFICE_3D, ROOM, SCENARIOS, find_scenario
 
 
 class FirstCandidate:
@@ -54,3 +58,63 @@ def test_where_everything_is_to_be_seen_no_time_goes_to_known_walls():
     settings = {"robots": 1, "track_truth": True, "split": "train", "ending": ending}
     figures = figures_of(FirstCandidate(), SCENARIOS["office"], **settings)
     assert figures["finished"] and figures["scans"] < 400 and figures["t_mission_s"] < 1500.0
+
+
+DRONES = {
+    "grid": Grid((160, 60, 20), 0.1),
+    "robots": 2,
+    "robot": {"body_radius_m": 0.3, "reach_m": 10.0, "redecide": 0.5},
+    "sensor": {
+        "field_of_view_rad": (6.283185307179586, 1.0),
+        "angular_step_rad": 0.1,
+        "max_range_m": 5.0,
+        "scan_time_s": 0.1,
+        "scan_every_m": 0.2,
+    },
+    "ending": {"seen_share": 0.99, "time_limit_s": 300.0},
+    "track_truth": True,
+}
+"""Settings of drones that scan in flight, in a grid that is fine for them."""
+
+
+@pytest.mark.parametrize(
+    ("settings", "wanted"),
+    [
+        ({}, True),
+        ({"sensor": {"scan_every_m": float("inf")}}, False),
+        ({"sensor": {"field_of_view_rad": (2.0, 1.0)}}, False),
+        ({"ending": {"seen_share": None}}, False),
+        ({"grid": Grid((64, 24, 8), 0.25)}, False),
+    ],
+)
+def test_drones_that_scan_in_flight_end_on_tours_in_fine_grids(settings, wanted):
+    scenario = with_settings(with_settings(OFFICE_3D, DRONES), settings)
+    assert ends_on_tours(scenario, scenario.kind_of(0)) == wanted
+
+
+def test_gains_are_low_where_a_robot_gained_little_lately_by_hand(monkeypatch):
+    monkeypatch.setattr(planned_rate, "_LATELY_S", 10.0)
+    monkeypatch.setattr(planned_rate, "_LITTLE", 0.2)
+    gains = planned_rate._Gains()
+
+    def low(time_s, gained_bits):
+        return gains.are_low(SimpleNamespace(time_s=time_s, gained_bits=gained_bits))
+
+    assert not low(0.0, 0.0) and not low(9.5, 1.0)  # too early to tell
+    assert not any(
+        low(0.5 * k, 10.0 * k) for k in range(20, 201)
+    )  # 20 bits a second for 100 s, and nothing then
+    assert not low(107.5, 2000.0)  # of the last ten seconds 2.5 s count: 5 bits a second, 3.7 are little
+    assert low(108.5, 2000.0)  # 3 bits a second
+    assert not low(109.0, 2040.0)
+
+
+def test_drones_begin_by_bits_per_time_and_end_on_tours():
+    scenario, strategy = with_settings(scripted(OFFICE_3D), DRONES), PlannedRate()
+    env, on_tours = EntropyExploreEnv(scenario), []
+    run_mission(env, strategy, 2, lambda _: on_tours.append(list(strategy._by_frontiers)))
+    assert mission_figures(env.missions, 0)["finished"]
+    assert not any(on_tours[0]) and any(on_tours[-1])
+    assert all(
+        on_tours[k][robot] <= on_tours[k + 1][robot] for k in range(len(on_tours) - 1) for robot in (0, 1)
+    )
