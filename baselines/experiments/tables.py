@@ -17,6 +17,7 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str
 
     Nothing is padded: a number that changes its width leaves the other lines of a page as they are.
     """
+    assert all(len(row) == len(head) for row in rows), "rows are as wide as the head"
     lines = [head, ["---"] * len(head), *rows]
     return "".join(f"| {' | '.join(map(str, line))} |\n" for line in lines)
 

@@ -50,7 +50,7 @@ SUITES: dict[str, Callable[[bool], Suite]] = {
     ),
 }
 """Name → what makes the suite, quick or whole, with the strategies of its table."""
-SCOREBOARD = ("plans", "volumes", "teams", "others", "c2")
+SCOREBOARD = ("plans", "volumes", "teams", "others")
 """Suites that stand on one page; each other one has a page of its own."""
 
 

@@ -140,6 +140,8 @@ def entries_table(folder: Path) -> str:
 
     Ratios are relative to the reference's missions in the archives of the pages to which that folder belongs.
     """
+    described = ["strategy", "by", "suite", "tasks", "missions", "finished"]
+    head = [*described, "first ratio", "second ratio", "checked"]
     rows: list[list[object]] = []
     for entry in sorted(each.parent for each in folder.glob(f"*/{entries.ABOUT}")):
         about, check = entries.read_about(entry), entries.read_check(entry)
@@ -154,18 +156,7 @@ def entries_table(folder: Path) -> str:
         suite = f"{about.suite}, quick" if about.quick else about.suite
         for name, *cells in _overall(results, own)[1]:
             link = f"[`{name}`](scoreboard/entries/{entry.name})"
-            rows.append([link, about.author, suite, *cells, checked])
-    head = [
-        "strategy",
-        "by",
-        "suite",
-        "tasks",
-        "missions",
-        "finished",
-        "first ratio",
-        "second ratio",
-        "checked",
-    ]
+            rows.append([link, about.author, suite, *cells[: len(head) - 4], checked])
     return markdown_table(head, rows) if rows else ""
 
 

@@ -135,7 +135,7 @@ class Suite:
         title: Heading of its part of a page.
         tasks: What each strategy runs.
         strategies: Names.
-        measures: Two measures, the more important one first.
+        measures: Two or more, the more important ones first.
         reference: The strategy to which ratios are relative; where it does not run, it is the random walk.
         later: Makes tasks that depend on the records of those before: (suite, cell → records) → tasks.
     """

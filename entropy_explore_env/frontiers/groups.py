@@ -1,8 +1,8 @@
 """Groups of connected frontier voxels, and which of them are large.
 
 Between the rays of a sensor, fine grids keep slivers of unknown voxels. A rule that goes to the nearest
-frontier cell would look into each of them in turn. So it is common to leave out groups of few voxels, as Yan
-et al. (2026) do. Voxels are connected by sides, edges or corners. `blocks` is a Blocks.
+frontier cell would look into each of them in turn. So groups of few voxels are left out, as in FUEL (Zhou et
+al. 2021). Voxels are connected by sides, edges or corners. `blocks` is a Blocks.
 """
 
 from __future__ import annotations
