@@ -7,7 +7,7 @@ every stop. What a robot is, and what its mission asks for, decides how it explo
 
 - Flying robots, and all in 3-D worlds: bits per time, with the recipe of narrow or of wide views.
 - Drones that scan in flight, in grids that are fine for them, in missions that end by what was seen: the
-  same, and what is left at last, on tours.
+  same, and on tours while they gain little.
 - Ground robots with a scanner that sees all around, in a plan, until the map has a given entropy: bits per
   time, of scans imagined in a predicted map where much is predicted solid (`missions.foresight`).
 - The same robots where everything is to be seen: frontier cells on short tours, see `planner.tour`.
@@ -42,7 +42,7 @@ _EVERYTHING = 0.995
 """Share of what can be seen from which on every corner must be seen."""
 _LATELY_S = 20.0
 _LITTLE = 0.2
-"""A drone goes on tours once it gained less, a second, than this share of its mission's mean."""
+"""A drone that gained less, a second, than this share of its mission's mean gains little."""
 
 
 def explores_frontiers(scenario: Scenario, kind: RobotKind) -> bool:
@@ -61,14 +61,16 @@ def _wants_everything(scenario: Scenario, kind: RobotKind) -> bool:
     return unseen < kind.sensor.max_range_m / scenario.grid.voxel_size_m
 
 
-def ends_on_tours(scenario: Scenario, kind: RobotKind) -> bool:
-    """Return whether robots of a kind go for frontier cells once they gain little.
+def tours_what_is_left(scenario: Scenario, kind: RobotKind) -> bool:
+    """Return whether robots of a kind go for frontier cells while they gain little.
 
     Drones that scan in flight do, in grids of which several voxels make a cell of their paths. By bits per
     time they would cross the world for each of the slivers between rays that are left.
     """
     scans_in_flight = sees_all_around(kind.sensor) and math.isfinite(kind.sensor.scan_every_m)
-    return scenario.ending.by_seen and scans_in_flight and cell_edge(scenario, kind) > 1
+    ending = scenario.ending  # where robots return, they go for what is left before that
+    by_share = ending.by_seen and not ending.return_to_start
+    return by_share and scans_in_flight and cell_edge(scenario, kind) > 1
 
 
 class _Gains:
@@ -110,9 +112,9 @@ class PlannedRate:
         self._by_frontiers = [weights is None and explores_frontiers(scenario, kind) for kind in kinds]
         """Whether each robot goes for frontier cells, and home when there are none."""
         self._returns = scenario.ending.return_to_start
-        ends = [weights is None and ends_on_tours(scenario, kind) for kind in kinds]
-        self._gains = {robot: _Gains() for robot, on_tours in enumerate(ends) if on_tours}
-        """Robot → what it gained lately, of those that end on tours."""
+        tours = [weights is None and tours_what_is_left(scenario, kind) for kind in kinds]
+        self._gains = {robot: _Gains() for robot, wanted in enumerate(tours) if wanted}
+        """Robot → what it gained lately, of those that tour what is left."""
         self._parts: list[SharedTour | ViewProposer] = []
         if any(self._by_frontiers) or self._returns or self._gains:
             self._tours = SharedTour()
@@ -141,8 +143,11 @@ class PlannedRate:
 
     def choose(self, view: RobotView) -> np.ndarray:
         """Return the viewpoint (5,) by the robot's own belief and what it has heard."""
-        if view.robot in self._gains and self._gains[view.robot].are_low(view):
-            self._by_frontiers[view.robot] = True
+        if view.robot in self._gains:
+            low = self._gains[view.robot].are_low(view)
+            if self._by_frontiers[view.robot] and not low:
+                self._tours.forget_goal(view)
+            self._by_frontiers[view.robot] = low
         if self._by_frontiers[view.robot]:
             return self._tours.choose(view)
         proposed = self._proposer.propose(view)
