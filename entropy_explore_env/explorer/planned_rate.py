@@ -6,8 +6,8 @@ more than every viewpoint nearby, along the shortest path by the robot's belief,
 every stop. What a robot is, and what its mission asks for, decides how it explores:
 
 - Flying robots, and all in 3-D worlds: bits per time, with the recipe of narrow or of wide views.
-- Drones that scan in flight, in grids that are fine for them, in missions that end by what was seen: the
-  same, and on tours while they gain little.
+- Drones that see all around and scan in flight, in grids that are fine for them, in missions that end by what
+  was seen: by bits per time, and on tours of frontier cells while they gain little.
 - Ground robots with a scanner that sees all around, in a plan, until the map has a given entropy: bits per
   time, of scans imagined in a predicted map where much is predicted solid (`missions.foresight`).
 - The same robots where everything is to be seen: frontier cells on short tours, see `planner.tour`.
@@ -41,6 +41,7 @@ from entropy_explore_env.viewpoints.evaluation import cell_edge, sees_all_around
 _EVERYTHING = 0.995
 """Share of what can be seen from which on every corner must be seen."""
 _LATELY_S = 20.0
+"""How far back the gains count by which a drone decides whether it gains little."""
 _LITTLE = 0.2
 """A drone that gained less, a second, than this share of its mission's mean gains little."""
 
@@ -64,13 +65,13 @@ def _wants_everything(scenario: Scenario, kind: RobotKind) -> bool:
 def tours_what_is_left(scenario: Scenario, kind: RobotKind) -> bool:
     """Return whether robots of a kind go for frontier cells while they gain little.
 
-    Drones that scan in flight do, in grids of which several voxels make a cell of their paths. By bits per
-    time they would cross the world for each of the slivers between rays that are left.
+    Drones do that see all around and scan in flight, where several voxels make a cell of their paths. By bits
+    per time they would cross the world for each of the slivers between rays that are left. Robots that return
+    to their start go for all frontier cells before that.
     """
     scans_in_flight = sees_all_around(kind.sensor) and math.isfinite(kind.sensor.scan_every_m)
-    ending = scenario.ending  # where robots return, they go for what is left before that
-    by_share = ending.by_seen and not ending.return_to_start
-    return by_share and scans_in_flight and cell_edge(scenario, kind) > 1
+    counts_seen = scenario.ending.by_seen and not scenario.ending.return_to_start
+    return counts_seen and scans_in_flight and cell_edge(scenario, kind) > 1
 
 
 class _Gains:
@@ -112,19 +113,27 @@ class PlannedRate:
         self._by_frontiers = [weights is None and explores_frontiers(scenario, kind) for kind in kinds]
         """Whether each robot goes for frontier cells, and home when there are none."""
         self._returns = scenario.ending.return_to_start
-        tours = [weights is None and tours_what_is_left(scenario, kind) for kind in kinds]
-        self._gains = {robot: _Gains() for robot, wanted in enumerate(tours) if wanted}
+        self._gains: dict[int, _Gains] = {}
         """Robot → what it gained lately, of those that tour what is left."""
         self._parts: list[SharedTour | ViewProposer] = []
-        if any(self._by_frontiers) or self._returns or self._gains:
-            self._tours = SharedTour()
-            self._tours.backs_off = False  # whatever the planner chooses is followed so
-            self._tours.reset(scenario, rng)
-            self._parts.append(self._tours)
+        self._rng, self._tours = rng, SharedTour()
+        self._tours.backs_off = False  # whatever the planner chooses is followed so
+        self._prepare_tours(scenario)
         if not all(self._by_frontiers):
             foresight = self._foresight() if self._foresight and predictions_pay(scenario) else None
             self._proposer = ViewProposer(self._proposing(scenario), rng, foresight=foresight)
             self._parts.append(self._proposer)
+
+    def _prepare_tours(self, scenario: Scenario) -> None:
+        """Get ready for tours, if a robot may go on one in the grid of a scenario."""
+        for robot in range(scenario.robots):
+            if self.weights is None and tours_what_is_left(scenario, scenario.kind_of(robot)):
+                self._gains.setdefault(robot, _Gains())
+        wanted = any(self._by_frontiers) or self._returns or len(self._gains) > 0
+        if wanted and self._tours not in self._parts:
+            self._tours.refines = len(self._gains) == 0
+            self._tours.reset(scenario, self._rng)
+            self._parts.append(self._tours)
 
     def _proposing(self, scenario: Scenario) -> Scenario:
         """Return a scenario with as many candidates as are compared."""
@@ -135,6 +144,7 @@ class PlannedRate:
         """Go on in a larger grid: see `explorer.goals.Decider`."""
         for part in self._parts:
             part.grow(self._proposing(scenario), shift)
+        self._prepare_tours(scenario)
 
     @property
     def search(self) -> Search:
@@ -143,15 +153,14 @@ class PlannedRate:
 
     def choose(self, view: RobotView) -> np.ndarray:
         """Return the viewpoint (5,) by the robot's own belief and what it has heard."""
-        if view.robot in self._gains:
-            low = self._gains[view.robot].are_low(view)
-            if self._by_frontiers[view.robot] and not low:
-                self._tours.forget_goal(view)
-            self._by_frontiers[view.robot] = low
-        if self._by_frontiers[view.robot]:
+        if view.robot in self._gains and view.ceiling is None:  # below an exposure surface there are no tours
+            viewpoint = self._toured(view)
+            if viewpoint is not None:
+                return viewpoint
+        elif self._by_frontiers[view.robot]:
             return self._tours.choose(view)
         proposed = self._proposer.propose(view)
-        if self._returns and view.ceiling is None:  # below an exposure surface there are no tours
+        if self._returns and view.ceiling is None:
             self._tours.start_from(view)
             if self._proposer.found_nothing(view.robot):
                 self._by_frontiers[view.robot] = True
@@ -161,6 +170,19 @@ class PlannedRate:
         features = self._proposer.features(view.robot)
         counts = np.array([len(proposed)], np.int64)
         return proposed[self.weights.choices(features[None], counts)[0]].copy()
+
+    def _toured(self, view: RobotView) -> np.ndarray | None:
+        """Return the viewpoint (5,) on a tour of what is left; None = it gains enough, or finds no cell."""
+        robot, tours = view.robot, self._by_frontiers[view.robot]
+        self._by_frontiers[robot] = False
+        if not self._gains[robot].are_low(view):
+            return None
+        if not tours:
+            self._tours.take_over(view)
+            self._proposer.forget_goal(robot)
+        viewpoint = self._tours.choose(view)
+        self._by_frontiers[robot] = not self._tours.found_nothing(robot)
+        return viewpoint if self._by_frontiers[robot] else None
 
     def found_nothing(self, robot: int) -> bool:
         """Return whether nothing that is worth a drive was found for a robot at its latest decision."""

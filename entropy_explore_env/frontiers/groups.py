@@ -17,11 +17,12 @@ _FOUND = 2
 
 @lean_kernel
 def fill_groups(blocks, least, found, groups):
-    """Mark groups of at least `least` EDGE voxels as LARGE; DROPPED voxels do not count.
+    """Mark groups of at least `least` EDGE voxels as LARGE, and return whether there are any.
 
-    (V,) uint8 `groups` is replaced, (V,) int32 `found` is scratch space.
+    DROPPED voxels do not count. (V,) uint8 `groups` is replaced, (V,) int32 `found` is scratch space.
     """
     groups[:] = 0
+    any_large = False
     for block in range(len(blocks.edges)):
         if blocks.edges[block] == 0:
             continue
@@ -32,12 +33,15 @@ def fill_groups(blocks, least, found, groups):
                     voxel = flat_index(blocks.size, x, y, z)
                     if groups[voxel] == 0 and _is_edge(blocks, voxel):
                         count = _fill_group(blocks, voxel, found, groups)
+                        any_large = any_large or count >= least
                         for place in range(count):
                             groups[found[place]] = _FOUND | (LARGE if count >= least else 0)
+    return any_large
 
 
 @lean_kernel
 def _is_edge(blocks, voxel):
+    """Return whether a voxel is an EDGE that is not DROPPED."""
     return blocks.flags[voxel] & (EDGE | DROPPED) == EDGE
 
 
@@ -61,9 +65,9 @@ def _fill_group(blocks, voxel, found, groups):
 
 @lean_kernel
 def keep_large(blocks, groups, cells, of_block, count):
-    """Move those of the first `count` cells to the front from which a body touches a large group.
+    """Keep those of the first `count` cells from which a body touches a large group; return their number.
 
-    (V,) int32 `cells` and `of_block` are those of `collect_candidates`. The number of cells is returned.
+    They move to the front of (V,) int32 `cells` and `of_block`, which `collect_candidates` filled.
     """
     kept = 0
     for place in range(count):
@@ -75,6 +79,7 @@ def keep_large(blocks, groups, cells, of_block, count):
 
 @lean_kernel
 def _touches_large(blocks, groups, cell):
+    """Return whether the footprint in a cell meets a large group."""
     x, y, z = grid_index(blocks.size, cell)
     for offset in blocks.footprint:
         near = cell_at(blocks.size, x + offset[0], y + offset[1], z + offset[2])

@@ -83,7 +83,10 @@ class KnownPaths:
         return math.isinf(self.reach) or self.search.queue.state[0]["entries"] == 0
 
     def frontiers_within(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return (K,) voxels and lengths of the nearest frontier cells of blocks, up to a length."""
+        """Return (K,) voxels and lengths of the nearest frontier cells of blocks, up to a length.
+
+        `VoxelFrontiers.nearest_of_blocks` says which ones drones find in fine grids.
+        """
         self.extend(reach)
         return self._cells.nearest_of_blocks(self.lengths_to, reach)
 

@@ -80,8 +80,8 @@ class VoxelFrontiers(FrontierMap):
         self._least = math.ceil(LEAST_GROUP_M2 / edge**2) if cell_edge(scenario, kind) > 1 else 1
         """Voxels of the smallest large group."""
         self._groups = np.zeros(scenario.grid.voxels if self._least > 1 else 0, np.uint8)
-        self._grouped = False
-        """Whether `_groups` are those of the edges as they are."""
+        self._grouped = self._any_large = False
+        """Whether `_groups` are those of the edges as they are, and whether any of them is large."""
         self._dropped: dict[int, tuple[bytes, np.ndarray]] = {}
         """Voxel → what its surroundings were when it was dropped, and which edges were dropped with it."""
 
@@ -179,16 +179,16 @@ class VoxelFrontiers(FrontierMap):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Find the frontier cell with the shortest path in each block.
 
-        In fine grids, drones find those at large groups of frontier voxels, if there are any.
+        In fine grids, drones find those at large groups of frontier voxels, unless no path leads to one.
 
         Args:
             lengths_to: (N,) int32 voxels → (N,) lengths of the paths to them; inf = no path.
-            reach: Cells with longer paths are left out, and those at small groups; inf = none are.
+            reach: Cells with longer paths are left out; inf allowed. A large group beyond it counts.
 
         Returns:
             (K,) int32 voxels and (K,) float64 lengths in voxel edges, in the order of the blocks.
         """
-        if self._least > 1:
+        if self._least > 1 and self._has_large():
             found = self._nearest_of_blocks(lengths_to, reach, only_large=True)
             if len(found[0]) or math.isfinite(reach):
                 return found
@@ -197,11 +197,10 @@ class VoxelFrontiers(FrontierMap):
     def _nearest_of_blocks(
         self, lengths_to: Callable[[np.ndarray], np.ndarray], reach: float, only_large: bool
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return what `nearest_of_blocks` does, at large groups alone or at all."""
+        """Return what `nearest_of_blocks` does, for large groups only or for all."""
         cells, of_block = np.empty((2, len(self._marks)), np.int32)
         count = collect_candidates(self._blocks, cells, of_block)
         if only_large:
-            self._group()
             count = keep_large(self._blocks, self._groups, cells, of_block, count)
         cells, of_block = cells[:count], of_block[:count]
         lengths, nearest = lengths_to(cells), np.full(len(self._voxels), NONE)
@@ -209,11 +208,13 @@ class VoxelFrontiers(FrontierMap):
         nearest = nearest[nearest != NONE]
         return cells[nearest], lengths[nearest]
 
-    def _group(self) -> None:
-        """Find the groups, unless the edges are as they were."""
+    def _has_large(self) -> bool:
+        """Return whether any group is large; groups are found anew if edges have changed."""
         if not self._grouped:
-            fill_groups(self._blocks, self._least, np.empty(len(self._marks), np.int32), self._groups)
+            found = np.empty(len(self._marks), np.int32)
+            self._any_large = bool(fill_groups(self._blocks, self._least, found, self._groups))
             self._grouped = True
+        return self._any_large
 
     def drop(self, voxel: int, with_edges: bool) -> None:
         """Take out a frontier cell until the map changes around it.

@@ -113,6 +113,10 @@ class ViewProposer:
         first = self._candidates[robot, 0]
         return bool(first["bits"] <= NO_GAIN_BITS and self._experience[robot]["blocked"] == 0)
 
+    def forget_goal(self, robot: int) -> None:
+        """Forget to which far place a robot was going, since it goes elsewhere now."""
+        self._experience[robot]["going"] = False
+
     def features(self, robot: int) -> np.ndarray:
         """Return (K, F) float32 of the candidates proposed to a robot last: `candidate_features.FEATURES`."""
         return self._features[robot]

@@ -163,6 +163,11 @@ class Driver(ABC):
         if np.isnan(trail.home[0]):
             trail.home = view.pose.copy()
 
+    def forget_drive(self, robot: int) -> None:
+        """Forget how a robot's latest drives ended, and where they led."""
+        trail = self._trails[robot]
+        self._trails[robot] = Trail(home=trail.home, most_bits=trail.most_bits)
+
     def _after_drive(self, view: RobotKnowledge, trail: Trail) -> np.ndarray | None:
         """Learn from how the latest drive ended; return a viewpoint where that alone decides."""
         if trail.room > 0:

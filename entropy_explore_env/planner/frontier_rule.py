@@ -52,7 +52,7 @@ class _Memory:
     viewpoint: np.ndarray | None = None
     """(5,) on the way to the goal, chosen last."""
     scanned: bool = False
-    """Whether the first scan was taken; robots under way have scanned."""
+    """Whether the first scan was taken."""
     gazes: int = 0
     """Number of directions in which it has looked from where it stands."""
 
@@ -116,6 +116,13 @@ class FrontierRule(Driver):
             memory.goal = NOWHERE
             memory.cells.drop(target, with_edges=False)
 
+    def take_over(self, view: RobotKnowledge) -> None:
+        """Begin to decide for a robot that has scanned, and for which something else has decided so far."""
+        self.forget_drive(view.robot)
+        self.observe(view)
+        self._memories[view.robot].scanned = True
+        self.forget_goal(view)
+
     def forget_goal(self, view: RobotKnowledge) -> None:
         """Choose anew at the next decision."""
         memory = self._memories[view.robot]
@@ -141,8 +148,8 @@ class FrontierRule(Driver):
     def decide(self, view: RobotKnowledge) -> np.ndarray | None:
         """Return the viewpoint on the way to the rule's goal; see `Driver`."""
         memory, here = self._memories[view.robot], voxel_of(view, view.pose)
-        first, memory.scanned = not memory.scanned, True
-        if first and not view.under_way:
+        if not memory.scanned:
+            memory.scanned = True
             gaze = None if self.turns_first else (float(view.pose[3]), float(view.pose[4]))
             return self._look(view, memory, view.pose, gaze)
         target, place, _, gaze = memory.goal

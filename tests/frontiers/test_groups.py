@@ -58,7 +58,7 @@ def test_groups_are_scipys_labels_and_cells_are_kept_that_touch_a_large_one(shap
     assert kept[:count].tolist() == of_block[:count].tolist() == cells[touching[cells]].tolist()
 
 
-def hall(unknown):
+def hall(unknown, least_m2=0.5):
     """A hall that a drone at (15, 10, 6) knows, but for boxes of voxels; cells of two voxels."""
     mean, precision = (
         np.full(DRONE.grid.shape, 0.05, np.float32),
@@ -71,7 +71,7 @@ def hall(unknown):
     )
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(evaluation, "_CELLS_WITHIN", 7)
-        patched.setattr(voxel_frontiers, "LEAST_GROUP_M2", 0.5)
+        patched.setattr(voxel_frontiers, "LEAST_GROUP_M2", least_m2)
         assert evaluation.cell_edge(DRONE, DRONE.kind_of(0)) == 2
         cells = VoxelFrontiers(DRONE, DRONE.kind_of(0))
         paths = KnownPaths(DRONE, DRONE.kind_of(0), cells, new_search(DRONE.grid.voxels))
@@ -91,13 +91,23 @@ def test_drones_go_to_a_large_group_past_a_small_one_and_to_small_ones_at_last_b
     assert abs(x - 15) <= 4 and y <= 6
 
 
-def test_a_group_that_is_dropped_is_large_no_longer_by_hand():
-    sliver, wall = ((15, 1, 4), (16, 2, 8)), ((50, 0, 0), (60, 20, 12))
-    scene = hall([sliver, wall])
-    while True:
-        x, _, _ = np.unravel_index(NearestFrontier().pick(scene), DRONE.grid.shape)
-        if x < 40:
-            break
+def test_a_group_that_shrinks_or_is_dropped_is_large_no_longer_by_hand():
+    """Groups of 50 voxels are large; the wall's has 12 for each of its rows along y."""
+    sliver = ((15, 1, 4), (16, 2, 8))
+
+    def picked(scene):
+        return np.unravel_index(NearestFrontier().pick(scene), DRONE.grid.shape)[0]
+
+    scene = hall([sliver, ((50, 0, 0), (60, 20, 12))], least_m2=2.3)
+    flags = scene.cells._marks.reshape(DRONE.grid.shape)[49]
+    while picked(scene) == 46:
+        before = int((flags & (EDGE | DROPPED) == EDGE).sum())
         scene.cells.drop(int(NearestFrontier().pick(scene)), with_edges=True)
-        scene.paths.start(scene.here)
-    assert abs(x - 15) <= 4
+    assert before >= 230 > int((flags & (EDGE | DROPPED) == EDGE).sum()) > 200
+
+    scene = hall([sliver, ((50, 0, 0), (60, 20, 12))])
+    for rows, large in ((20, True), (5, True), (4, False), (6, True)):
+        precision, mean = scene.view.precision, scene.view.mean
+        precision[50:60], precision[50:60, :rows], mean[50:60, rows:] = 100.0, 30.0**-2, 0.95
+        scene.cells.update(scene.view, 0.5)
+        assert (picked(scene) == 46) == large
