@@ -186,7 +186,7 @@ _OWN = (
         "planned-rate",
         PlannedRate,
         "argmax of expected bits for their time, over viewpoints nearby and far places on planned paths; "
-        "ground robots that explore a plan until all is seen follow short tours through frontier cells",
+        "short tours through frontier cells where ground robots see all of a plan and drones gain little",
         _EVERYWHERE + _C2,
     ),
     Entry(

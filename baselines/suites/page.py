@@ -87,6 +87,7 @@ def part_texts(results: Results, rows: Sequence[KeptRow]) -> dict[str, Any]:
         "name": results.suite.name,
         "title": results.suite.title,
         "missions": len(rows),
+        "wanted": len(results.suite.strategies) * sum(task.missions for task in results.suite.tasks),
         "rows": origins_line(rows),
         "absent": [name for name in results.suite.strategies if name not in results.ran],
     }
