@@ -173,11 +173,11 @@ class PlannedRate:
 
     def _toured(self, view: RobotView) -> np.ndarray | None:
         """Return the viewpoint (5,) on a tour of what is left; None = it gains enough, or finds no cell."""
-        robot, tours = view.robot, self._by_frontiers[view.robot]
+        robot, toured = view.robot, self._by_frontiers[view.robot]
         self._by_frontiers[robot] = False
         if not self._gains[robot].are_low(view):
             return None
-        if not tours:
+        if not toured:
             self._tours.take_over(view)
             self._proposer.forget_goal(robot)
         viewpoint = self._tours.choose(view)

@@ -108,3 +108,15 @@ def test_drones_in_fine_grids_find_about_the_same_lengths_in_cells(seed):
     np.testing.assert_array_equal(coarse.lengths_to(others), by_cells)
     walled = np.random.default_rng(seed).choice(np.flatnonzero(np.isinf(cells.traversal_cost)), 20)
     assert np.isinf(coarse.lengths_from(here, walled.astype(np.int32))).all()
+
+
+def test_a_frontier_cell_just_beyond_the_reach_of_a_finished_search_counts_by_hand():
+    """A free strip of 9 × 2 cells: the frontier cell in its far corner is 8.41 away, the first reach is 8."""
+    plan = np.full((40, 40), reference.WALL, np.int8)
+    plan[5:14, 5:7] = reference.FREE
+    plan[14, 6] = reference.UNKNOWN
+    scene = scene_of(plan, (5, 5))
+    scene.paths.start(scene.here)
+    assert scene.paths.reach == 8.0 and scene.paths.exhausted()
+    voxels, lengths = scene.paths.nearest_frontiers()
+    assert voxels.tolist() == [13 * 40 + 6] and lengths[0] == pytest.approx(7.0 + np.sqrt(2.0))
