@@ -174,6 +174,16 @@ def shares_face(blocks, marks, mask, value, x, y, z):
 
 
 @inlined_kernel
+def meets(blocks, marks, mask, value, x, y, z):
+    """Return whether the footprint in a cell meets a cell with a value in masked (N,) marks."""
+    for offset in blocks.footprint:
+        near = cell_at(blocks.size, x + offset[0], y + offset[1], z + offset[2])
+        if near != NONE and marks[near] & mask == value:
+            return True
+    return False
+
+
+@inlined_kernel
 def set_flag(blocks, cell, flag, value):
     """Set or clear a flag of a cell."""
     blocks.flags[cell] = blocks.flags[cell] & (_ALL_FLAGS - flag) | (flag if value else 0)
@@ -262,11 +272,7 @@ def _meets_edge(blocks, x, y, z):
     """Return whether the footprint in a cell meets the edge."""
     if len(blocks.met) > 0:
         return blocks.met[flat_index(blocks.size, x, y, z)] > 0
-    for offset in blocks.footprint:
-        near = cell_at(blocks.size, x + offset[0], y + offset[1], z + offset[2])
-        if near != NONE and blocks.flags[near] & (EDGE | DROPPED) == EDGE:
-            return True
-    return False
+    return meets(blocks, blocks.flags, EDGE | DROPPED, EDGE, x, y, z)
 
 
 @lean_kernel

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from entropy_explore_env.belief.voxel_index import flat_index, grid_index
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.frontiers.blocks import DROPPED, EDGE, block_span, cell_at
+from entropy_explore_env.frontiers.blocks import DROPPED, EDGE, block_span, meets
 
 LARGE = 1
 _FOUND = 2
@@ -71,18 +71,8 @@ def keep_large(blocks, groups, cells, of_block, count):
     """
     kept = 0
     for place in range(count):
-        if _touches_large(blocks, groups, cells[place]):
+        x, y, z = grid_index(blocks.size, cells[place])
+        if meets(blocks, groups, LARGE, LARGE, x, y, z):
             cells[kept], of_block[kept] = cells[place], of_block[place]
             kept += 1
     return kept
-
-
-@lean_kernel
-def _touches_large(blocks, groups, cell):
-    """Return whether the footprint in a cell meets a large group."""
-    x, y, z = grid_index(blocks.size, cell)
-    for offset in blocks.footprint:
-        near = cell_at(blocks.size, x + offset[0], y + offset[1], z + offset[2])
-        if near >= 0 and groups[near] & LARGE:
-            return True
-    return False

@@ -86,13 +86,17 @@ class FrontierRule(Driver):
         self._finest = min(scenario.ending.sigma_end, KNOWN_SIGMA) if refines else KNOWN_SIGMA
 
     def observe(self, view: RobotKnowledge) -> None:
-        """Bring the robot's cells up to date. Its memory is made at its first choice: see `new_cells`."""
+        """Bring the robot's cells up to date."""
+        memory = self._memory_of(view)
+        memory.cells.update(view, memory.level)
+
+    def _memory_of(self, view: RobotKnowledge) -> _Memory:
+        """Return what is kept of a robot, which is made at its first choice: see `new_cells`."""
         if view.robot not in self._memories:
             cells = self.new_cells(view)
             paths = KnownPaths(self._scenario, view.kind, cells, self.search)
             self._memories[view.robot] = _Memory(cells, paths, KNOWN_SIGMA)
-        memory = self._memories[view.robot]
-        memory.cells.update(view, memory.level)
+        return self._memories[view.robot]
 
     def new_cells(self, view: RobotKnowledge) -> VoxelFrontiers:
         """Return the empty frontier cells of a robot; an exposure surface is not known before its first view.
@@ -119,8 +123,7 @@ class FrontierRule(Driver):
     def take_over(self, view: RobotKnowledge) -> None:
         """Begin to decide for a robot that has scanned, and for which something else has decided so far."""
         self.forget_drive(view.robot)
-        self.observe(view)
-        self._memories[view.robot].scanned = True
+        self._memory_of(view).scanned = True
         self.forget_goal(view)
 
     def forget_goal(self, view: RobotKnowledge) -> None:

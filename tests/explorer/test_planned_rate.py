@@ -105,9 +105,8 @@ def test_gains_are_low_where_a_robot_gained_little_lately_by_hand(monkeypatch):
         return gains.are_low(SimpleNamespace(time_s=time_s, gained_bits=gained_bits))
 
     assert not low(0.0, 0.0) and not low(9.5, 1.0)  # too early to tell
-    assert not any(
-        low(0.5 * k, 10.0 * k) for k in range(20, 201)
-    )  # 20 bits a second for 100 s, and nothing then
+    # 20 bits a second for 100 s, and nothing then:
+    assert not any(low(0.5 * k, 10.0 * k) for k in range(20, 201))
     assert not low(107.5, 2000.0)  # of the last ten seconds 2.5 s count: 5 bits a second, 3.7 are little
     assert low(108.5, 2000.0)  # 3 bits a second
     assert not low(109.0, 2040.0)
