@@ -62,7 +62,9 @@ def server(monkeypatch, tmp_path):
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "worlds"))
     monkeypatch.setenv("NO_PROXY", "127.0.0.1")
     handler = type("Handler", (Answers,), {"asked": []})
-    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), handler) as serving:
+    with http.server.HTTPServer(
+        ("127.0.0.1", 0), handler
+    ) as serving:  # one thread: it closes all its sockets
         thread = threading.Thread(target=functools.partial(serving.serve_forever, poll_interval=0.01))
         thread.start()
         monkeypatch.setattr(fetching, "HOST", f"http://127.0.0.1:{serving.server_port}")
