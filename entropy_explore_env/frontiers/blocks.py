@@ -31,6 +31,10 @@ COUNTED_FREE = 32
 COUNTED_EDGE = 64
 """An EDGE that is not DROPPED, and counted as such in `Blocks.met`."""
 _ALL_FLAGS = 127
+CANDIDATES_STALE = 1
+"""The candidates of a block have to be found anew."""
+EDGES_STALE = 2
+"""The edges in a block, too."""
 NONE = -1
 """In place of the number of a cell or voxel: there is none."""
 _NO_COSTS = np.zeros(0)
@@ -53,7 +57,7 @@ class Blocks(NamedTuple):
     edges: np.ndarray
     """(B,) uint8, whether a block holds an EDGE."""
     dirty: np.ndarray
-    """(B,) uint8, whether a block has to be updated."""
+    """(B,) uint8: 0, CANDIDATES_STALE or EDGES_STALE."""
     size: tuple[int, int, int]
     """Cells along each axis."""
     across: tuple[int, int, int]
@@ -126,14 +130,25 @@ def _blocks_near(blocks, low, high, radius):
 
 
 @lean_kernel
-def mark_around(blocks, cell, radius):
-    """Let the blocks with a cell within `radius` along every axis be updated next time."""
+def mark_around(blocks, cell, radius, stale):
+    """Let the blocks with a cell within `radius` along every axis be updated next time.
+
+    `stale` is CANDIDATES_STALE or EDGES_STALE.
+    """
     x, y, z = grid_index(blocks.size, cell)
     first, last = _blocks_near(blocks, (x, y, z), (x + 1, y + 1, z + 1), radius)
     for i in range(first[0], last[0]):
         for j in range(first[1], last[1]):
             for k in range(first[2], last[2]):
-                blocks.dirty[flat_index(blocks.blocks, i, j, k)] = 1
+                block = flat_index(blocks.blocks, i, j, k)
+                blocks.dirty[block] = max(blocks.dirty[block], stale)
+
+
+@lean_kernel
+def mark_changed(blocks, cell):
+    """Let the blocks be updated next time in which the new state of a cell may count."""
+    mark_around(blocks, cell, blocks.reach + 2, CANDIDATES_STALE)
+    mark_around(blocks, cell, 1, EDGES_STALE)
 
 
 @inlined_kernel
@@ -216,10 +231,10 @@ def count_for_bodies(blocks, counts, cell, flag, counted):
 
 @lean_kernel
 def mark_edges(blocks):
-    """Set EDGE in the blocks that have to be updated."""
+    """Set EDGE in the blocks whose edges are stale."""
     state = blocks.state
     for block in range(len(blocks.dirty)):
-        if blocks.dirty[block] == 0:
+        if blocks.dirty[block] != EDGES_STALE:
             continue
         blocks.edges[block] = 0
         low, high = block_span(blocks, block)

@@ -2,27 +2,48 @@
 
 Between the rays of a sensor, fine grids keep slivers of unknown voxels. A rule that goes to the nearest
 frontier cell would look into each of them in turn. So groups of few voxels are left out, as in FUEL (Zhou et
-al. 2021). Voxels are connected by sides, edges or corners. `blocks` is a Blocks.
+al. 2021). Voxels are connected by sides, edges or corners; an EDGE that is DROPPED is in no group. A group is
+searched when it is asked for, and no farther than until it is known to be large. `blocks` is a Blocks,
+`groups` a Groups.
 """
 
 from __future__ import annotations
 
-from entropy_explore_env.belief.voxel_index import flat_index, grid_index
-from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.frontiers.blocks import DROPPED, EDGE, block_span, meets
+import math
+from typing import NamedTuple
 
-LARGE = 1
-_FOUND = 2
+import numpy as np
+
+from entropy_explore_env.belief.voxel_index import flat_index, grid_index
+from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.frontiers.blocks import DROPPED, EDGE, NONE, block_span, cell_at
+
+_SMALL, _LARGE = 1, 2
+
+
+class Groups(NamedTuple):
+    """What is known of the groups of V voxels; `forget` it when edges change."""
+
+    least: int
+    """Voxels of the smallest large group; up to 1 = all groups are large, and nothing is searched."""
+    size_of: np.ndarray
+    """(V,) uint8, 0 = not searched yet; (0,) where nothing is searched."""
+    found: np.ndarray
+    """(least,) int32, scratch space."""
+
+    def forget(self) -> None:
+        """Forget what was found: the edges have changed."""
+        self.size_of[:] = 0
+
+
+def new_groups(voxels: int, least: int) -> Groups:
+    """Return the groups of voxels in none of which anything is known yet."""
+    return Groups(least, np.zeros(voxels if least > 1 else 0, np.uint8), np.empty(least, np.int32))
 
 
 @lean_kernel
-def fill_groups(blocks, least, found, groups):
-    """Mark groups of at least `least` EDGE voxels as LARGE, and return whether there are any.
-
-    DROPPED voxels do not count. (V,) uint8 `groups` is replaced, (V,) int32 `found` is scratch space.
-    """
-    groups[:] = 0
-    any_large = False
+def any_large(blocks, groups):
+    """Return whether any group is large."""
     for block in range(len(blocks.edges)):
         if blocks.edges[block] == 0:
             continue
@@ -31,48 +52,76 @@ def fill_groups(blocks, least, found, groups):
             for y in range(low[1], high[1]):
                 for z in range(low[2], high[2]):
                     voxel = flat_index(blocks.size, x, y, z)
-                    if groups[voxel] == 0 and _is_edge(blocks, voxel):
-                        count = _fill_group(blocks, voxel, found, groups)
-                        any_large = any_large or count >= least
-                        for place in range(count):
-                            groups[found[place]] = _FOUND | (LARGE if count >= least else 0)
-    return any_large
+                    if _is_grouped(blocks, voxel) and _is_large(blocks, groups, voxel):
+                        return True
+    return False
 
 
 @lean_kernel
-def _is_edge(blocks, voxel):
-    """Return whether a voxel is an EDGE that is not DROPPED."""
+def fill_nearest(blocks, groups, cells, lengths, of_block, reach, nearest):
+    """Find the first of the nearest cells at large groups of each of K blocks, and set its index.
+
+    Args:
+        blocks: Of the frontier.
+        groups: What is found is noted.
+        cells: (N,) int32.
+        lengths: (N,) of the paths to them; inf = no path.
+        of_block: (N,) int32, their blocks.
+        reach: Cells with longer paths are left out; inf allowed.
+        nearest: (K,) indices of cells; NONE where none is known yet.
+    """
+    for place in range(len(cells)):
+        best = nearest[of_block[place]]
+        near = lengths[place] <= reach and not math.isinf(lengths[place])
+        if near and (best == NONE or lengths[place] < lengths[best]):
+            if groups.least <= 1 or _touches_large(blocks, groups, cells[place]):
+                nearest[of_block[place]] = place
+
+
+@lean_kernel
+def _touches_large(blocks, groups, cell):
+    """Return whether a body in a cell touches a voxel of a large group."""
+    x, y, z = grid_index(blocks.size, cell)
+    for offset in blocks.footprint:
+        near = cell_at(blocks.size, x + offset[0], y + offset[1], z + offset[2])
+        if near != NONE and _is_grouped(blocks, near) and _is_large(blocks, groups, near):
+            return True
+    return False
+
+
+@inlined_kernel
+def _is_grouped(blocks, voxel):
+    """Return whether a voxel is in a group."""
     return blocks.flags[voxel] & (EDGE | DROPPED) == EDGE
 
 
+@inlined_kernel
+def _is_large(blocks, groups, voxel):
+    """Return whether the group of a voxel is large."""
+    if groups.size_of[voxel] == 0:
+        _search_group(blocks, groups, voxel)
+    return groups.size_of[voxel] == _LARGE
+
+
 @lean_kernel
-def _fill_group(blocks, voxel, found, groups):
-    """Fill `found` with the group of a voxel, mark it as found, and return its size."""
-    size, count, place = blocks.size, 1, 0
-    found[0], groups[voxel] = voxel, _FOUND
-    while place < count:
+def _search_group(blocks, groups, voxel):
+    """Search the group of a voxel until it is known to be large, and note that of all voxels found."""
+    size, found, size_of = blocks.size, groups.found, groups.size_of
+    found[0], size_of[voxel] = voxel, _SMALL
+    count, place, large = 1, 0, False
+    while place < count and not large:
         x, y, z = grid_index(size, found[place])
         place += 1
         for i in range(max(x - 1, 0), min(x + 2, size[0])):
             for j in range(max(y - 1, 0), min(y + 2, size[1])):
                 for k in range(max(z - 1, 0), min(z + 2, size[2])):
                     near = flat_index(size, i, j, k)
-                    if groups[near] == 0 and _is_edge(blocks, near):
-                        found[count], groups[near] = near, _FOUND
+                    if large or not _is_grouped(blocks, near):
+                        continue
+                    if size_of[near] == 0:
+                        found[count], size_of[near] = near, _SMALL
                         count += 1
-    return count
-
-
-@lean_kernel
-def keep_large(blocks, groups, cells, of_block, count):
-    """Keep those of the first `count` cells from which a body touches a large group; return their number.
-
-    They move to the front of (V,) int32 `cells` and `of_block`, which `collect_candidates` filled.
-    """
-    kept = 0
-    for place in range(count):
-        x, y, z = grid_index(blocks.size, cells[place])
-        if meets(blocks, groups, LARGE, LARGE, x, y, z):
-            cells[kept], of_block[kept] = cells[place], of_block[place]
-            kept += 1
-    return kept
+                    large = count == groups.least or size_of[near] == _LARGE
+    if large:
+        for place in range(count):
+            size_of[found[place]] = _LARGE

@@ -135,9 +135,9 @@ class KnownPaths:
         self.start(voxel)
         self.extend(least)
         lengths = self.lengths_to(others)
-        while self.reach < most and not (lengths <= self.reach).all():
+        while self.reach < most and len(left := np.flatnonzero(~(lengths <= self.reach))):
             self.extend(most if math.isinf(most) else min(_FARTHER * self.reach, most))
-            lengths = self.lengths_to(others)
+            lengths[left] = self.lengths_to(others[left])
         return lengths
 
     def mean_length(self, voxel: int, others: np.ndarray, least: float, most: float) -> float:

@@ -24,7 +24,7 @@ from entropy_explore_env.frontiers.blocks import (
     Blocks,
     block_span,
     choose_candidate,
-    mark_around,
+    mark_changed,
     mark_edges,
     new_blocks,
     replace_unreached,
@@ -123,7 +123,7 @@ def update_terrain(terrain, mean, precision, levels):
         if column != before:
             if _find_ground(terrain, column):
                 note_opened(terrain.states, voxel)
-            mark_around(columns, column, columns.reach + 2)
+            mark_changed(columns, column)
             before = column
     update_columns(terrain)
     return changed

@@ -24,7 +24,7 @@ from entropy_explore_env.frontiers.blocks import (
     replace_unreached,
 )
 from entropy_explore_env.frontiers.frontier_map import FrontierConfig, FrontierMap
-from entropy_explore_env.frontiers.groups import fill_groups, keep_large
+from entropy_explore_env.frontiers.groups import Groups, any_large, fill_nearest, new_groups
 from entropy_explore_env.frontiers.visibility import (
     count_crossed,
     count_from,
@@ -38,7 +38,6 @@ from entropy_explore_env.frontiers.voxel_map import (
     body_footprint,
     collect_candidates,
     count_connected,
-    fill_nearest,
     first_viewing_place,
     keep_unseen,
     update_blocks,
@@ -77,11 +76,8 @@ class VoxelFrontiers(FrontierMap):
         ball = math.pi * wide**2 if self._size[2] == 1 else 4.0 / 3.0 * math.pi * wide**3
         self._most = min(ball, float(scenario.grid.voxels))
         self._radius, self._sight = self.body_reach + 2, (self.reach + 2.0, 1.0)
-        self._least = math.ceil(LEAST_GROUP_M2 / edge**2) if cell_edge(scenario, kind) > 1 else 1
-        """Voxels of the smallest large group."""
-        self._groups = np.zeros(scenario.grid.voxels if self._least > 1 else 0, np.uint8)
-        self._grouped = self._any_large = False
-        """Whether `_groups` are those of the edges as they are, and whether any of them is large."""
+        least = math.ceil(LEAST_GROUP_M2 / edge**2) if cell_edge(scenario, kind) > 1 else 1
+        self._groups = new_groups(scenario.grid.voxels, least)
         self._dropped: dict[int, tuple[bytes, np.ndarray]] = {}
         """Voxel → what its surroundings were when it was dropped, and which edges were dropped with it."""
 
@@ -89,7 +85,7 @@ class VoxelFrontiers(FrontierMap):
         """See `FrontierMap`; dropped cells count again where the map has changed around them."""
         super().update(view, sigma)
         if self.changed:
-            self._grouped = False
+            self._groups.forget()
             for voxel in [v for v, (was, _) in self._dropped.items() if self._surroundings(v) != was]:
                 self._restore(voxel)
 
@@ -100,7 +96,7 @@ class VoxelFrontiers(FrontierMap):
     def _find_candidates(self) -> None:
         """See `FrontierMap`."""
         update_blocks(self._blocks, self._costs)
-        self._grouped = False
+        self._groups.forget()
 
     def replace_unreached(self, cost: np.ndarray) -> None:
         """See `FrontierMap`."""
@@ -188,33 +184,23 @@ class VoxelFrontiers(FrontierMap):
         Returns:
             (K,) int32 voxels and (K,) float64 lengths in voxel edges, in the order of the blocks.
         """
-        if self._least > 1 and self._has_large():
-            found = self._nearest_of_blocks(lengths_to, reach, only_large=True)
-            if len(found[0]) or math.isfinite(reach):
-                return found
-        return self._nearest_of_blocks(lengths_to, reach, only_large=False)
-
-    def _nearest_of_blocks(
-        self, lengths_to: Callable[[np.ndarray], np.ndarray], reach: float, only_large: bool
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return what `nearest_of_blocks` does, for large groups only or for all."""
         cells, of_block = np.empty((2, len(self._marks)), np.int32)
         count = collect_candidates(self._blocks, cells, of_block)
-        if only_large:
-            count = keep_large(self._blocks, self._groups, cells, of_block, count)
         cells, of_block = cells[:count], of_block[:count]
-        lengths, nearest = lengths_to(cells), np.full(len(self._voxels), NONE)
-        fill_nearest(lengths, of_block, reach, nearest)
-        nearest = nearest[nearest != NONE]
+        lengths = lengths_to(cells)
+        nearest = self._nearest(self._groups, cells, lengths, of_block, reach)
+        if len(nearest) == 0 and self._groups.least > 1:
+            if math.isinf(reach) or not any_large(self._blocks, self._groups):
+                nearest = self._nearest(self._groups._replace(least=1), cells, lengths, of_block, reach)
         return cells[nearest], lengths[nearest]
 
-    def _has_large(self) -> bool:
-        """Return whether any group is large; groups are found anew if edges have changed."""
-        if not self._grouped:
-            found = np.empty(len(self._marks), np.int32)
-            self._any_large = bool(fill_groups(self._blocks, self._least, found, self._groups))
-            self._grouped = True
-        return self._any_large
+    def _nearest(
+        self, groups: Groups, cells: np.ndarray, lengths: np.ndarray, of_block: np.ndarray, reach: float
+    ) -> np.ndarray:
+        """Return indices of the nearest cells of blocks at large groups; arguments as of `fill_nearest`."""
+        nearest = np.full(len(self._voxels), NONE)
+        fill_nearest(self._blocks, groups, cells, lengths, of_block, reach, nearest)
+        return nearest[nearest != NONE]
 
     def drop(self, voxel: int, with_edges: bool) -> None:
         """Take out a frontier cell until the map changes around it.

@@ -27,7 +27,7 @@ from entropy_explore_env.frontiers.blocks import (
     cell_at,
     choose_candidate,
     count_for_bodies,
-    mark_around,
+    mark_changed,
     mark_edges,
     set_flag,
     shares_face,
@@ -58,7 +58,7 @@ def update_voxels(states, blocks, cost, mean, precision, levels):
         for voxel in states.changed[:count]:
             z = grid_index(blocks.size, voxel)[2]
             if blocks.layer < 0 or abs(z - blocks.layer) <= blocks.reach + 2:
-                mark_around(blocks, voxel, blocks.reach + 2)
+                mark_changed(blocks, voxel)
             if len(blocks.free) > 0:
                 free = blocks.state[voxel] & (UNMAPPED | COVERED) == 0
                 count_for_bodies(blocks, blocks.free, voxel, COUNTED_FREE, free)
@@ -119,16 +119,6 @@ def collect_candidates(blocks, cells, of_block):
                         cells[count], of_block[count] = cell, block
                         count += 1
     return count
-
-
-@lean_kernel
-def fill_nearest(lengths, of_block, reach, nearest):
-    """Set (K,) indices of the first of the nearest cells of K blocks, by (N,) lengths up to `reach`."""
-    for cell in range(len(lengths)):
-        best = nearest[of_block[cell]]
-        near = lengths[cell] <= reach and not math.isinf(lengths[cell])
-        if near and (best == NONE or lengths[cell] < lengths[best]):
-            nearest[of_block[cell]] = cell
 
 
 @lean_kernel

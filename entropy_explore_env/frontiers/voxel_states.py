@@ -20,7 +20,7 @@ UNMAPPED = 2
 COVERED = 4
 """Believed covered: it stops rays and bodies."""
 _TOGETHER = 128
-"""Voxels that are compared together, without branches, before single ones are."""
+"""Voxels that are compared together, by vector instructions, before single ones are."""
 
 
 class VoxelStates(NamedTuple):
@@ -82,8 +82,9 @@ def update_states(states, mean, precision, levels, begin, end):
     state, count = states.state, 0
     for first in range(begin, end, _TOGETHER):
         last, different = min(first + _TOGETHER, end), np.uint8(0)
-        for voxel in range(first, last):
-            different |= state[voxel] ^ _state_of(mean[voxel], precision[voxel], levels)
+        states_here, means, precisions = state[first:last], mean[first:last], precision[first:last]
+        for place in range(last - first):
+            different |= states_here[place] ^ _state_of(means[place], precisions[place], levels)
         if different == 0:
             continue
         for voxel in range(first, last):

@@ -15,7 +15,7 @@ from baselines.strategies.rules.nearest_frontier import NearestFrontier
 from entropy_explore_env.belief.paths.search import new_search
 from entropy_explore_env.frontiers import voxel_frontiers
 from entropy_explore_env.frontiers.blocks import DROPPED, EDGE, NONE, new_blocks
-from entropy_explore_env.frontiers.groups import LARGE, fill_groups, keep_large
+from entropy_explore_env.frontiers.groups import any_large, fill_nearest, new_groups
 from entropy_explore_env.frontiers.path_lengths import KnownPaths
 from entropy_explore_env.frontiers.voxel_frontiers import VoxelFrontiers
 from entropy_explore_env.frontiers.voxel_map import body_footprint
@@ -33,29 +33,37 @@ DRONE = with_settings(
 
 
 @given(st.sampled_from([(9, 6, 7), (5, 11, 8), (13, 9, 1)]), st.integers(1, 9), st.floats(0.05, 0.4), seeds)
-@drawn(40)
-def test_groups_are_scipys_labels_and_cells_are_kept_that_touch_a_large_one(shape, least, share, seed):
+@drawn(60)
+def test_the_nearest_cells_that_touch_a_large_one_of_scipys_labels_are_found(shape, least, share, seed):
     rng = np.random.default_rng(seed)
     layer = 0 if shape[2] == 1 else None
     state = np.zeros(math.prod(shape), np.uint8)
     blocks = new_blocks(shape, state, body_footprint(shape, 1.3, layer), layer, 3)
-    edge, dropped = rng.random(shape) < share, rng.random(shape) < 0.2
-    blocks.flags[edge.ravel()] |= EDGE
-    blocks.flags[dropped.ravel()] |= DROPPED
-    blocks.edges[:] = 1
-    labels, _ = ndimage.label(edge & ~dropped, np.ones((3, 3, 3)))
-    large = (np.bincount(labels.ravel())[labels] >= least) & (labels > 0)
-    groups = rng.integers(0, 4, len(state)).astype(np.uint8)  # of a map before this one
-    fill_groups(blocks, least, np.empty(len(state), np.int32), groups)
-    np.testing.assert_array_equal((groups & LARGE > 0).reshape(shape), large)
+    groups = new_groups(len(state), least)
+    for _ in range(2):  # the second time as after a change of the edges
+        edge, dropped = rng.random(shape) < share, rng.random(shape) < 0.2
+        blocks.flags[:] = np.where(edge.ravel(), EDGE, 0) | np.where(dropped.ravel(), DROPPED, 0)
+        blocks.edges[:] = 1
+        labels, _ = ndimage.label(edge & ~dropped, np.ones((3, 3, 3)))
+        large = (np.bincount(labels.ravel())[labels] >= least) & (labels > 0)
+        groups.forget()
 
-    cells = rng.permutation(len(state)).astype(np.int32)
-    kept, of_block = cells.copy(), cells.copy()
-    count = keep_large(blocks, groups, kept, of_block, len(cells))
-    body = np.zeros((2 * blocks.reach + 1,) * 3, bool)
-    body[tuple((blocks.footprint + blocks.reach).T)] = True
-    touching = ndimage.binary_dilation(large, body).ravel()
-    assert kept[:count].tolist() == of_block[:count].tolist() == cells[touching[cells]].tolist()
+        body = np.zeros((2 * blocks.reach + 1,) * 3, bool)
+        body[tuple((blocks.footprint + blocks.reach).T)] = True
+        touching = ndimage.binary_dilation(large, body).ravel() | (least == 1)
+        cells = rng.permutation(len(state)).astype(np.int32)
+        lengths = rng.integers(0, 9, len(state)).astype(float)
+        lengths[lengths == 8] = np.inf
+        of_block, nearest = rng.integers(0, 5, len(state)).astype(np.int32), np.full(5, NONE)
+        fill_nearest(blocks, groups, cells, lengths, of_block, 5.0, nearest)
+        allowed = np.where(touching[cells] & (lengths <= 5.0), lengths, np.inf)
+        for block in range(5):
+            worth = np.where(of_block == block, allowed, np.inf)
+            assert nearest[block] == (int(np.argmin(worth)) if np.isfinite(worth).any() else NONE)
+        if least > 1:
+            assert any_large(blocks, groups) == large.any()
+            groups.forget()
+            assert any_large(blocks, groups) == large.any()
 
 
 def hall(unknown, least_m2=0.5):

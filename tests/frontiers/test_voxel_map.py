@@ -9,7 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import ndimage
 
-from entropy_explore_env.frontiers.blocks import CANDIDATE, DROPPED, NONE, mark_around, new_blocks
+from entropy_explore_env.frontiers.blocks import (
+    CANDIDATE,
+    DROPPED,
+    EDGES_STALE,
+    NONE,
+    mark_around,
+    new_blocks,
+)
 from entropy_explore_env.frontiers.voxel_map import AT_ONCE, body_footprint, update_voxels
 from entropy_explore_env.frontiers.voxel_states import COVERED, UNEXPLORED, UNMAPPED, new_states
 from tests.reference import sawhney as reference
@@ -106,7 +113,7 @@ def test_in_space_voxels_change_to_and_fro_and_edges_are_dropped_and_restored(sh
         blocks.flags[dropped.ravel()] |= DROPPED
         blocks.flags[~dropped.ravel()] &= np.uint8(0xFF ^ DROPPED)
         for voxel in np.flatnonzero(dropped != before):
-            mark_around(blocks, voxel, blocks.reach)
+            mark_around(blocks, voxel, blocks.reach, EDGES_STALE)
         updated(frontiers, mean, precision)
         state = state_of(mean, precision)
         free = (state & (UNMAPPED | COVERED) == 0).astype(int)
