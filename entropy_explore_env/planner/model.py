@@ -83,7 +83,7 @@ class Proposer(NamedTuple):
 
     recipe: Recipe
     drawn: ScanModel  # How scans at drawn viewpoints are imagined
-    exact: ScanModel  # How scans are imagined with all rays
+    exact: ScanModel  # How scans at refined viewpoints and far places are imagined
     drive: DriveModel
     lattice: Lattice  # Steps between cells, in which paths are searched
     planar: bool
@@ -178,7 +178,7 @@ def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: Prop
     grid, robot, sensor = scenario.grid, kind.robot, kind.sensor
     drawn, exact = (
         robot_model(scenario, kind, thinning, recipe.stop_probability, recipe.gap_probability)
-        for thinning in (recipe.draw_thinning, 1)
+        for thinning in (recipe.draw_thinning, recipe.thinning)
     )
     planar, reach = scenario.layer_of(robot) is not None, robot.reach_m / grid.voxel_size_m
     width, height = sensor.field_of_view_rad

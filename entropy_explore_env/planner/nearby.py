@@ -210,7 +210,7 @@ def propose_nearby(proposer, situation):
                 copy_numbers(pool[order[k]].viewpoint, pool[size].viewpoint)
                 _vary(proposer, situation, spread, pool[size].viewpoint)
                 size += 1
-        if number == 0 and recipe.draw_thinning != 1:
+        if number == 0 and recipe.draw_thinning != recipe.thinning:
             for k in range(best):
                 drawn = pool[order[k] : order[k] + 1]
                 evaluate(proposer, situation, proposer.exact, drawn, False)

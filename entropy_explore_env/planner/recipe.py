@@ -21,11 +21,11 @@ class Recipe(NamedTuple):
     stop_probability: float  # probability that an unknown voxel stops an imagined ray
     gap_probability: float  # probability that an unknown voxel beside a covered one stops an imagined ray
     draw_thinning: int
-    """One in this many columns, and rows, of the sensor's rays is imagined for viewpoints that are drawn; for
-    those that are refined, and for far places, all rays are."""
+    """One in this many columns, and rows, of the sensor's rays is imagined for viewpoints that are drawn."""
     gazes: int  # viewpoints that are drawn around the present gaze, on the spot
     turns: int  # viewpoints that are drawn on the spot with any gaze
     places: int  # viewpoints that are drawn within reach with any gaze
+    thinning: int = 1  # the same for viewpoints that are refined, and for far places
     refinements: int = 2  # how often viewpoints are drawn around the best ones so far
     refined: int = 12  # viewpoints that are drawn in each refinement
     far_places: int = 24  # known free places that are evaluated beyond those within reach
@@ -59,7 +59,10 @@ ALL_AROUND = Recipe(
 """Scanners that see all around: they choose places, not gazes."""
 
 MANY_RAYS = 2000
-"""Number of rays from which on ALL_AROUND imagines one in two columns and rows where viewpoints are drawn."""
+"""Number of rays from which on scanners that see all around are ALL_AROUND_DENSELY."""
+
+ALL_AROUND_DENSELY = ALL_AROUND._replace(draw_thinning=4, thinning=2)
+"""Scanners with so many rays that a quarter of them tells as much."""
 
 NARROW_PLANNED = Recipe(
     exponent=1.0,
@@ -99,7 +102,7 @@ NARROW_STRAIGHT = Recipe(
 def recipe_for(kind: RobotKind) -> Recipe:
     """Return the recipe of a kind of robot."""
     if sees_all_around(kind.sensor):
-        return ALL_AROUND if kind.sensor.rays < MANY_RAYS else ALL_AROUND._replace(draw_thinning=2)
+        return ALL_AROUND if kind.sensor.rays < MANY_RAYS else ALL_AROUND_DENSELY
     return NARROW_PLANNED if kind.robot.navigator == "planned" else NARROW_STRAIGHT
 
 

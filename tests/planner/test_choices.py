@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.frontiers.blocks import NONE
+from entropy_explore_env.planner.model import new_proposers
 from entropy_explore_env.planner.recipe import (
     ALL_AROUND,
+    ALL_AROUND_DENSELY,
+    MANY_RAYS,
     NARROW_PLANNED,
     NARROW_STRAIGHT,
     angular_spread,
@@ -17,6 +20,7 @@ from entropy_explore_env.planner.scene import best_of
 from entropy_explore_env.planner.states import PlannerState, next_state
 from entropy_explore_env.planner.thresholds import DEPLETED_SCANS
 from entropy_explore_env.planner.tour import Tour
+from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import SCENARIOS
 from tests.planner.scenes import cell, corridor, scene_of, varied
 
@@ -34,6 +38,16 @@ from tests.planner.scenes import cell, corridor, scene_of, varied
 )
 def test_the_recipe_is_that_of_the_robot(name, recipe):
     assert recipe_for(SCENARIOS[name].kinds[0]) is recipe
+
+
+def test_of_many_rays_a_quarter_is_imagined_and_a_sixteenth_where_viewpoints_are_drawn():
+    sensor = {"field_of_view_rad": (2.0 * math.pi, 1.2), "angular_step_rad": math.pi / 60, "max_range_m": 5.0}
+    many = with_settings(SCENARIOS["office-3d"], {"sensor": sensor, "action": {"kind": "candidates"}})
+    assert many.kinds[0].sensor.rays == 120 * 23 > MANY_RAYS
+    assert recipe_for(many.kinds[0]) is ALL_AROUND_DENSELY
+    proposer = new_proposers(many)[0]
+    counts = [(len(scan.yaws), len(scan.pitches)) for scan in (proposer.exact, proposer.drawn)]
+    assert counts == [(60, 11), (30, 5)]
 
 
 def test_gazes_of_scanners_vary_between_rays_and_of_others_by_half_a_view():
