@@ -31,10 +31,10 @@ COUNTED_FREE = 32
 COUNTED_EDGE = 64
 """An EDGE that is not DROPPED, and counted as such in `Blocks.met`."""
 _ALL_FLAGS = 127
-CANDIDATES_STALE = 1
-"""The candidates of a block have to be found anew."""
-EDGES_STALE = 2
-"""The edges in a block, too."""
+FIND_CANDIDATES = 1
+"""A block's candidates have to be found again."""
+FIND_EDGES = 2
+"""A block's edges and candidates have to be found again."""
 NONE = -1
 """In place of the number of a cell or voxel: there is none."""
 _NO_COSTS = np.zeros(0)
@@ -57,7 +57,7 @@ class Blocks(NamedTuple):
     edges: np.ndarray
     """(B,) uint8, whether a block holds an EDGE."""
     dirty: np.ndarray
-    """(B,) uint8: 0, CANDIDATES_STALE or EDGES_STALE."""
+    """(B,) uint8, what has to be found again: 0, FIND_CANDIDATES or FIND_EDGES."""
     size: tuple[int, int, int]
     """Cells along each axis."""
     across: tuple[int, int, int]
@@ -130,25 +130,22 @@ def _blocks_near(blocks, low, high, radius):
 
 
 @lean_kernel
-def mark_around(blocks, cell, radius, stale):
-    """Let the blocks with a cell within `radius` along every axis be updated next time.
-
-    `stale` is CANDIDATES_STALE or EDGES_STALE.
-    """
+def mark_around(blocks, cell, radius, wanted):
+    """Mark the blocks with a cell within `radius` along every axis: FIND_CANDIDATES or FIND_EDGES."""
     x, y, z = grid_index(blocks.size, cell)
     first, last = _blocks_near(blocks, (x, y, z), (x + 1, y + 1, z + 1), radius)
     for i in range(first[0], last[0]):
         for j in range(first[1], last[1]):
             for k in range(first[2], last[2]):
                 block = flat_index(blocks.blocks, i, j, k)
-                blocks.dirty[block] = max(blocks.dirty[block], stale)
+                blocks.dirty[block] = max(blocks.dirty[block], wanted)
 
 
 @lean_kernel
 def mark_changed(blocks, cell):
-    """Let the blocks be updated next time in which the new state of a cell may count."""
-    mark_around(blocks, cell, blocks.reach + 2, CANDIDATES_STALE)
-    mark_around(blocks, cell, 1, EDGES_STALE)
+    """Mark the blocks whose edges or candidates depend on the state of a cell."""
+    mark_around(blocks, cell, blocks.reach + 2, FIND_CANDIDATES)
+    mark_around(blocks, cell, 1, FIND_EDGES)
 
 
 @inlined_kernel
@@ -189,16 +186,6 @@ def shares_face(blocks, marks, mask, value, x, y, z):
 
 
 @inlined_kernel
-def meets(blocks, marks, mask, value, x, y, z):
-    """Return whether the footprint in a cell meets a cell with a value in masked (N,) marks."""
-    for offset in blocks.footprint:
-        near = cell_at(blocks.size, x + offset[0], y + offset[1], z + offset[2])
-        if near != NONE and marks[near] & mask == value:
-            return True
-    return False
-
-
-@inlined_kernel
 def set_flag(blocks, cell, flag, value):
     """Set or clear a flag of a cell."""
     blocks.flags[cell] = blocks.flags[cell] & (_ALL_FLAGS - flag) | (flag if value else 0)
@@ -231,10 +218,10 @@ def count_for_bodies(blocks, counts, cell, flag, counted):
 
 @lean_kernel
 def mark_edges(blocks):
-    """Set EDGE in the blocks whose edges are stale."""
+    """Set EDGE in the blocks whose edges have to be found again."""
     state = blocks.state
     for block in range(len(blocks.dirty)):
-        if blocks.dirty[block] != EDGES_STALE:
+        if blocks.dirty[block] != FIND_EDGES:
             continue
         blocks.edges[block] = 0
         low, high = block_span(blocks, block)
@@ -287,7 +274,11 @@ def _meets_edge(blocks, x, y, z):
     """Return whether the footprint in a cell meets the edge."""
     if len(blocks.met) > 0:
         return blocks.met[flat_index(blocks.size, x, y, z)] > 0
-    return meets(blocks, blocks.flags, EDGE | DROPPED, EDGE, x, y, z)
+    for offset in blocks.footprint:
+        near = cell_at(blocks.size, x + offset[0], y + offset[1], z + offset[2])
+        if near != NONE and blocks.flags[near] & (EDGE | DROPPED) == EDGE:
+            return True
+    return False
 
 
 @lean_kernel

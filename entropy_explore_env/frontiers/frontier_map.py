@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from entropy_explore_env.frontiers.blocks import EDGES_STALE, EXCLUDED, NONE, Blocks, mark_around
+from entropy_explore_env.frontiers.blocks import EXCLUDED, FIND_EDGES, NONE, Blocks, mark_around
 from entropy_explore_env.frontiers.visibility import VisibilityCounter, forget_in_range, new_counter
 from entropy_explore_env.frontiers.voxel_states import UNMAPPED, VoxelStates
 from entropy_explore_env.robots.knowledge import RobotKnowledge
@@ -136,7 +136,7 @@ class FrontierMap(ABC):
         """Find the candidates anew within a radius of (K,) voxels."""
         layers = len(self._costs) // len(self._blocks.state)
         for voxel in voxels.tolist():
-            mark_around(self._blocks, voxel // layers, radius, EDGES_STALE)
+            mark_around(self._blocks, voxel // layers, radius, FIND_EDGES)
         self._find_candidates()
 
     @abstractmethod

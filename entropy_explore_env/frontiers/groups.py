@@ -19,25 +19,26 @@ from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.frontiers.blocks import DROPPED, EDGE, NONE, block_span, cell_at
 
 _SMALL, _LARGE = 1, 2
+"""Kinds of the voxels of groups."""
 
 
 class Groups(NamedTuple):
-    """What is known of the groups of V voxels; `forget` it when edges change."""
+    """Which of V voxels are in large groups, as far as that was asked."""
 
     least: int
     """Voxels of the smallest large group; up to 1 = all groups are large, and nothing is searched."""
-    size_of: np.ndarray
-    """(V,) uint8, 0 = not searched yet; (0,) where nothing is searched."""
+    kind_of: np.ndarray
+    """(V,) uint8: _SMALL, _LARGE, or 0 = not searched yet; (0,) where nothing is searched."""
     found: np.ndarray
     """(least,) int32, scratch space."""
 
     def forget(self) -> None:
-        """Forget what was found: the edges have changed."""
-        self.size_of[:] = 0
+        """Forget what was found, after a change of the edges."""
+        self.kind_of[:] = 0
 
 
 def new_groups(voxels: int, least: int) -> Groups:
-    """Return the groups of voxels in none of which anything is known yet."""
+    """Return the groups of a map of which nothing was asked yet."""
     return Groups(least, np.zeros(voxels if least > 1 else 0, np.uint8), np.empty(least, np.int32))
 
 
@@ -59,16 +60,18 @@ def any_large(blocks, groups):
 
 @lean_kernel
 def fill_nearest(blocks, groups, cells, lengths, of_block, reach, nearest):
-    """Find the first of the nearest cells at large groups of each of K blocks, and set its index.
+    """Find the nearest cell of each of K blocks from which a body touches a large group.
+
+    The first one counts where several are as near. Where all groups are large, all cells count.
 
     Args:
-        blocks: Of the frontier.
-        groups: What is found is noted.
-        cells: (N,) int32.
+        blocks: Blocks of the frontier.
+        groups: Groups, in which searched voxels are marked.
+        cells: (N,) int32, frontier cells.
         lengths: (N,) of the paths to them; inf = no path.
         of_block: (N,) int32, their blocks.
         reach: Cells with longer paths are left out; inf allowed.
-        nearest: (K,) indices of cells; NONE where none is known yet.
+        nearest: (K,) indices in `cells`, changed; NONE = none was found yet.
     """
     for place in range(len(cells)):
         best = nearest[of_block[place]]
@@ -80,7 +83,7 @@ def fill_nearest(blocks, groups, cells, lengths, of_block, reach, nearest):
 
 @lean_kernel
 def _touches_large(blocks, groups, cell):
-    """Return whether a body in a cell touches a voxel of a large group."""
+    """Return whether a body in a cell touches a voxel of a large group, and search what groups it takes."""
     x, y, z = grid_index(blocks.size, cell)
     for offset in blocks.footprint:
         near = cell_at(blocks.size, x + offset[0], y + offset[1], z + offset[2])
@@ -98,16 +101,16 @@ def _is_grouped(blocks, voxel):
 @inlined_kernel
 def _is_large(blocks, groups, voxel):
     """Return whether the group of a voxel is large."""
-    if groups.size_of[voxel] == 0:
+    if groups.kind_of[voxel] == 0:
         _search_group(blocks, groups, voxel)
-    return groups.size_of[voxel] == _LARGE
+    return groups.kind_of[voxel] == _LARGE
 
 
 @lean_kernel
 def _search_group(blocks, groups, voxel):
-    """Search the group of a voxel until it is known to be large, and note that of all voxels found."""
-    size, found, size_of = blocks.size, groups.found, groups.size_of
-    found[0], size_of[voxel] = voxel, _SMALL
+    """Search the group of a voxel until it is known to be large, and mark the voxels found as what it is."""
+    size, found, kind_of = blocks.size, groups.found, groups.kind_of
+    found[0], kind_of[voxel] = voxel, _SMALL
     count, place, large = 1, 0, False
     while place < count and not large:
         x, y, z = grid_index(size, found[place])
@@ -118,10 +121,10 @@ def _search_group(blocks, groups, voxel):
                     near = flat_index(size, i, j, k)
                     if large or not _is_grouped(blocks, near):
                         continue
-                    if size_of[near] == 0:
-                        found[count], size_of[near] = near, _SMALL
+                    if kind_of[near] == 0:
+                        found[count], kind_of[near] = near, _SMALL
                         count += 1
-                    large = count == groups.least or size_of[near] == _LARGE
+                    large = count == groups.least or kind_of[near] == _LARGE
     if large:
         for place in range(count):
-            size_of[found[place]] = _LARGE
+            kind_of[found[place]] = _LARGE

@@ -197,7 +197,7 @@ class VoxelFrontiers(FrontierMap):
     def _nearest(
         self, groups: Groups, cells: np.ndarray, lengths: np.ndarray, of_block: np.ndarray, reach: float
     ) -> np.ndarray:
-        """Return indices of the nearest cells of blocks at large groups; arguments as of `fill_nearest`."""
+        """Return the indices of the cells that `fill_nearest` finds, block by block."""
         nearest = np.full(len(self._voxels), NONE)
         fill_nearest(self._blocks, groups, cells, lengths, of_block, reach, nearest)
         return nearest[nearest != NONE]

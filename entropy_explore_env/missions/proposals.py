@@ -117,10 +117,10 @@ def propose_to(params, robot, known, proposer, parts):
     """
     own, scratch, mean, precision = params[robot], proposer.scratch, known.mean, known.precision
     knowledge, candidates = known.knowledge, known.candidates
-    for scan in (proposer.drawn, proposer.exact):
+    for scan in (proposer.drawn, proposer.refined):
         scan.pose_variance[0], scan.pose_variance[1] = knowledge.place_variance, knowledge.yaw_variance
     mates, cones = _hear(params, robot, known.heard, knowledge.time_s, scratch)
-    seen, cost = proposer.exact.known_precision, proposer.unknown_cost
+    seen, cost = proposer.refined.known_precision, proposer.unknown_cost
     situation = Situation(
         knowledge,
         Belief(mean, precision, grid_size(own)),

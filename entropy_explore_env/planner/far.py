@@ -83,7 +83,7 @@ def _seconds_bound(proposer, situation, block, searched, at):
     standing_off = 2.0 * (lattice.edge - 1)  # a body may stand in another voxel of the same cell
     copy_numbers(here, at)
     at[0] += max(math.sqrt(squared) - standing_off, STRAIGHTENED * searched)
-    return travel_seconds(proposer.drive, proposer.exact.voxel_size_m, here, at, 0.0, proposer.reach)
+    return travel_seconds(proposer.drive, proposer.refined.voxel_size_m, here, at, 0.0, proposer.reach)
 
 
 @lean_kernel
@@ -100,7 +100,11 @@ def _fill_far(proposer, situation, state, searched, options):
     scratch, blocks, recipe, drive = proposer.scratch, proposer.blocks, proposer.recipe, proposer.drive
     here, window, at = situation.knowledge.pose, blocks.window, scratch.at
     paths = FoundPaths(scratch.search, proposer.lattice, situation.costs)
-    worths, gazes, edge_m = scratch.worth[: recipe.far_places], recipe.far_gazes, proposer.exact.voxel_size_m
+    worths, gazes, edge_m = (
+        scratch.worth[: recipe.far_places],
+        recipe.far_gazes,
+        proposer.refined.voxel_size_m,
+    )
     rng, count, beyond = situation.experience.candidates_rng, 0, 0.0
     for i in range(window[0, 0], window[0, 1]):
         for j in range(window[1, 0], window[1, 1]):
@@ -140,7 +144,7 @@ def _evaluate_far(proposer, situation, count):
     if experience.going:
         copy_numbers(experience.goal, far[count].viewpoint)
         count += 1
-    evaluate(proposer, situation, proposer.exact, far[:count], True)
+    evaluate(proposer, situation, proposer.refined, far[:count], True)
     for number in range(count):
         best = max(best, far[number].value)
     return count, best
@@ -166,7 +170,7 @@ def propose_far(proposer, situation, state):
     size, start = belief.size, voxel_at(belief.size, situation.knowledge.pose)
     everywhere = float(size[0] + size[1] + size[2]) * proposer.unknown_cost
     radius = min(FIRST_RADIUS * proposer.within, everywhere)
-    count_of = BitCount(proposer.target_precision, proposer.exact.known_precision, proposer.recipe.behind)
+    count_of = BitCount(proposer.target_precision, proposer.refined.known_precision, proposer.recipe.behind)
     if proposer.lattice.edge > 1:
         radius = everywhere if state == _DEPLETED else radius
         fill_blocks(belief, count_of, start, math.ceil(everywhere), proposer.blocks)
@@ -182,7 +186,7 @@ def propose_far(proposer, situation, state):
         fill_blocks(belief, count_of, start, math.ceil(radius), proposer.blocks)
         count, _ = _fill_far(proposer, situation, state, radius, far)
         count, best = _evaluate_far(proposer, situation, count)
-        seconds = max(radius * proposer.exact.voxel_size_m / proposer.drive.max_speed_m_s, 1e-9)
+        seconds = max(radius * proposer.refined.voxel_size_m / proposer.drive.max_speed_m_s, 1e-9)
         if radius >= everywhere or best >= value_of(proposer, situation, experience.most_bits, seconds):
             return count, best
         radius = min(2.0 * radius, everywhere)
@@ -243,7 +247,7 @@ def gaze_on_the_way(proposer, situation, gazes, goal, stop):
     for number in range(gazes):
         if number > 0:
             _draw_gaze(proposer, situation.experience.candidates_rng, tried)
-        bits = expected_bits(situation.belief, proposer.exact, tried, scratch.scan)
+        bits = expected_bits(situation.belief, proposer.refined, tried, scratch.scan)
         worth = worth_bits(proposer, situation, tried, bits)
         if worth > most:
             most = worth

@@ -86,7 +86,7 @@ def _contest(proposer, situation, goal, seconds):
     soonest = math.inf
     for mate in situation.mates:
         if not mate.silent:
-            length_m = distance_between(mate.place, goal) * proposer.exact.voxel_size_m
+            length_m = distance_between(mate.place, goal) * proposer.refined.voxel_size_m
             there_s = driving_time(length_m, mate.max_speed_m_s, mate.acceleration_m_s2) + mate.scan_time_s
             soonest = min(soonest, there_s)
     if math.isinf(soonest):
@@ -133,7 +133,7 @@ def _diagonal(size):
 def _write_view(proposer, k, row):
     """Fill in the features of what candidate k should see."""
     scratch = proposer.scratch
-    view, longest = scratch.views[k], proposer.exact.max_range_m / proposer.exact.voxel_size_m
+    view, longest = scratch.views[k], proposer.refined.max_range_m / proposer.refined.voxel_size_m
     longest, seen = min(longest, _diagonal(proposer.lattice.grid)), max(view.seen, 1)
     row[_AGAIN] = clip(view.again_bits / view.bits)
     row[_UNIQUE] = clip(view.unique / seen)

@@ -83,7 +83,7 @@ class Proposer(NamedTuple):
 
     recipe: Recipe
     drawn: ScanModel  # How scans at drawn viewpoints are imagined
-    exact: ScanModel  # How scans at refined viewpoints and far places are imagined
+    refined: ScanModel  # How scans at all other viewpoints are imagined
     drive: DriveModel
     lattice: Lattice  # Steps between cells, in which paths are searched
     planar: bool
@@ -154,7 +154,7 @@ def new_proposers(
         recipe: Of all kinds; None = that of each.
         predicted: Whether `ScanScratch.solid` says what is predicted of unknown voxels.
     """
-    recipes, voxels = [recipe or recipe_for(kind) for kind in scenario.kinds], scenario.grid.voxels
+    recipes, voxels = [recipe or recipe_for(scenario, kind) for kind in scenario.kinds], scenario.grid.voxels
     rows = max(kind.sensor.rows for kind in scenario.kinds)
     scratch = ProposalScratch(
         scan=new_scan_scratch(voxels, _longest_ray(scenario), rows, predicted),
@@ -176,19 +176,21 @@ def _least_seconds(kind: RobotKind) -> float:
 
 def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: ProposalScratch) -> Proposer:
     grid, robot, sensor = scenario.grid, kind.robot, kind.sensor
-    drawn, exact = (
+    drawn, refined = (
         robot_model(scenario, kind, thinning, recipe.stop_probability, recipe.gap_probability)
         for thinning in (recipe.draw_thinning, recipe.thinning)
     )
     planar, reach = scenario.layer_of(robot) is not None, robot.reach_m / grid.voxel_size_m
     width, height = sensor.field_of_view_rad
     edge, layer = cell_edge(scenario, kind), scenario.layer_of(robot)
-    lattice = exact.lattice if edge == 1 else new_lattice(grid.shape, exact.drive.body_radius, layer, edge)
+    lattice = (
+        refined.lattice if edge == 1 else new_lattice(grid.shape, refined.drive.body_radius, layer, edge)
+    )
     return Proposer(
         recipe=recipe,
         drawn=drawn.scan,
-        exact=exact.scan,
-        drive=exact.drive,
+        refined=refined.scan,
+        drive=refined.drive,
         lattice=lattice,
         planar=planar,
         level=bool(scenario.looks_level(robot)),
@@ -201,7 +203,7 @@ def _proposer(scenario: Scenario, kind: RobotKind, recipe: Recipe, scratch: Prop
         view_width_rad=float(max(width, height, sensor.angular_step_rad)),
         refined_rad=float(angular_spread(kind)),
         least_s=float(_least_seconds(kind)),
-        target_precision=min(float(scenario.ending.sigma_end**-2), exact.scan.wanted_precision),
+        target_precision=min(float(scenario.ending.sigma_end**-2), refined.scan.wanted_precision),
         unknown_cost=float(robot.unknown_cost),
         blocks=new_blocks(grid.shape, _block_edge(scenario, recipe)),
         scratch=scratch,

@@ -213,8 +213,8 @@ def propose_nearby(proposer, situation):
         if number == 0 and recipe.draw_thinning != recipe.thinning:
             for k in range(best):
                 drawn = pool[order[k] : order[k] + 1]
-                evaluate(proposer, situation, proposer.exact, drawn, False)
-        evaluate(proposer, situation, proposer.exact, pool[first:size], False)
+                evaluate(proposer, situation, proposer.refined, drawn, False)
+        evaluate(proposer, situation, proposer.refined, pool[first:size], False)
         count = best + size - first
         for k in range(first, size):
             order[best + k - first] = k

@@ -242,9 +242,9 @@ def _came_bits(proposer, situation, candidates, chosen):
     walls brings bits, too, however often it is taken.
     """
     knowledge = situation.knowledge
-    if math.isinf(proposer.exact.wanted_precision) or chosen < 0 or knowledge.under_way:
+    if math.isinf(proposer.refined.wanted_precision) or chosen < 0 or knowledge.under_way:
         return knowledge.came_bits
-    left = expected_bits(situation.belief, proposer.exact, knowledge.target, proposer.scratch.scan)
+    left = expected_bits(situation.belief, proposer.refined, knowledge.target, proposer.scratch.scan)
     return candidates[chosen].bits - left
 
 
@@ -258,9 +258,9 @@ def _keep_target(proposer, situation, number):
     for axis in range(3):
         at[axis] = min(max(at[axis], 0.0), float(situation.belief.size[axis]))
     _pull_within(proposer, knowledge.pose, at)
-    evaluate(proposer, situation, proposer.exact, options, False)
+    evaluate(proposer, situation, proposer.refined, options, False)
     if options[0].seconds == math.inf:  # what came is still compared with what its scan should bring
-        bits = expected_bits(situation.belief, proposer.exact, at, proposer.scratch.scan)
+        bits = expected_bits(situation.belief, proposer.refined, at, proposer.scratch.scan)
         options[0].bits = options[0].stop_bits = worth_bits(proposer, situation, at, bits)
     if experience.going:
         copy_numbers(experience.goal, options[0].goal)

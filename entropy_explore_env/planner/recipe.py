@@ -11,7 +11,8 @@ import math
 from typing import NamedTuple
 
 from entropy_explore_env.settings.robot_kind import RobotKind
-from entropy_explore_env.viewpoints.evaluation import sees_all_around
+from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.viewpoints.evaluation import cell_edge, sees_all_around
 
 
 class Recipe(NamedTuple):
@@ -25,7 +26,6 @@ class Recipe(NamedTuple):
     gazes: int  # viewpoints that are drawn around the present gaze, on the spot
     turns: int  # viewpoints that are drawn on the spot with any gaze
     places: int  # viewpoints that are drawn within reach with any gaze
-    thinning: int = 1  # the same for viewpoints that are refined, and for far places
     refinements: int = 2  # how often viewpoints are drawn around the best ones so far
     refined: int = 12  # viewpoints that are drawn in each refinement
     far_places: int = 24  # known free places that are evaluated beyond those within reach
@@ -38,6 +38,9 @@ class Recipe(NamedTuple):
     known_ground_share: float = 0.0
     """Bits that a scan of known ground still brings, as a share of the most bits ever expected of a scan;
     bits up to that are worth next to nothing, and bits above count without them."""
+    thinning: int = 1
+    """One in this many columns, and rows, of the sensor's rays is imagined for refined viewpoints, far places
+    and views of candidates."""
     leave_below: float = 0.0
     """A robot whose last decision brought fewer bits a second than this share of its mission's mean so far
     chooses by the plain rate, c = 1 (the marginal value theorem of Charnov 1976: foragers leave a patch)."""
@@ -59,10 +62,7 @@ ALL_AROUND = Recipe(
 """Scanners that see all around: they choose places, not gazes."""
 
 MANY_RAYS = 2000
-"""Number of rays from which on scanners that see all around are ALL_AROUND_DENSELY."""
-
-ALL_AROUND_DENSELY = ALL_AROUND._replace(draw_thinning=4, thinning=2)
-"""Scanners with so many rays that a quarter of them tells as much."""
+"""Number of rays from which scanners that see all around get a recipe that imagines fewer of them."""
 
 NARROW_PLANNED = Recipe(
     exponent=1.0,
@@ -99,11 +99,19 @@ NARROW_STRAIGHT = Recipe(
 """Narrow fields of view, straight drives of short reach: nearly all time is turning and scanning."""
 
 
-def recipe_for(kind: RobotKind) -> Recipe:
-    """Return the recipe of a kind of robot."""
-    if sees_all_around(kind.sensor):
-        return ALL_AROUND if kind.sensor.rays < MANY_RAYS else ALL_AROUND_DENSELY
-    return NARROW_PLANNED if kind.robot.navigator == "planned" else NARROW_STRAIGHT
+def recipe_for(scenario: Scenario, kind: RobotKind) -> Recipe:
+    """Return the recipe of a kind of robot in a scenario.
+
+    Where scanners of many rays look for what was not seen, in grids that are fine for them, one ray in two
+    columns and rows tells as much. Bits that are expected are then compared with no bits of a scan.
+    """
+    if not sees_all_around(kind.sensor):
+        return NARROW_PLANNED if kind.robot.navigator == "planned" else NARROW_STRAIGHT
+    if kind.sensor.rays < MANY_RAYS:
+        return ALL_AROUND
+    if scenario.ending.by_seen and cell_edge(scenario, kind) > 1:
+        return ALL_AROUND._replace(draw_thinning=4, thinning=2)
+    return ALL_AROUND._replace(draw_thinning=2)
 
 
 def angular_spread(kind: RobotKind) -> float:

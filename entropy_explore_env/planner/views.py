@@ -29,7 +29,7 @@ def look_from(proposer, situation, at, number, most_common):
         voxels of either in common.
     """
     scratch = proposer.scratch
-    touched = imagine_scan(situation.belief, proposer.exact, at, scratch.scan)
+    touched = imagine_scan(situation.belief, proposer.refined, at, scratch.scan)
     view = scratch.views[number]
     _gather(proposer, situation, at, touched, view)
     _count_common(scratch, number)
@@ -98,7 +98,7 @@ def _gather(proposer, situation, at, touched, view):
             dx, dy, dz = x + 0.5 - at[0], y + 0.5 - at[1], z + 0.5 - at[2]
             scan.touched[seen] = voxel
             seen += 1
-            unknown += int(precision < proposer.exact.known_precision)
+            unknown += int(precision < proposer.refined.known_precision)
             distance += math.sqrt(dx * dx + dy * dy + dz * dz)
     view.bits = 0.5 * (bits + math.log2(growth))
     view.all_bits = 0.5 * (all_bits + math.log2(all_growth))
@@ -124,7 +124,7 @@ def mark_view(proposer, belief, number, marked):
             scratch.seen[marked] = voxel
             marked += 1
         marks[voxel] |= bit
-    slivers, known = 0, proposer.exact.known_precision
+    slivers, known = 0, proposer.refined.known_precision
     for i in range(view.seen):
         if belief.precision[touched[i]] < known:
             slivers += _slivers_beside(belief, touched[i], known, marks, bit)

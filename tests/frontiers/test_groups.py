@@ -66,14 +66,18 @@ def test_the_nearest_cells_that_touch_a_large_one_of_scipys_labels_are_found(sha
             assert any_large(blocks, groups) == large.any()
 
 
-def hall(unknown, least_m2=0.5):
-    """A hall that a drone at (15, 10, 6) knows, but for boxes of voxels; cells of two voxels."""
+def hall(unknown, least_m2=0.5, walls=()):
+    """A hall that a drone at (15, 10, 6) knows, but for boxes of voxels; cells are of two voxels.
+
+    Each of `walls` is the x of a wall across the hall.
+    """
     mean, precision = (
         np.full(DRONE.grid.shape, 0.05, np.float32),
         np.full(DRONE.grid.shape, 100.0, np.float32),
     )
     for low, high in unknown:
         precision[tuple(slice(*ends) for ends in zip(low, high, strict=True))] = 30.0**-2
+    mean[list(walls)] = 0.95
     view = SimpleNamespace(
         mean=mean, precision=precision, scenario=DRONE, teammates={}, robot=0, since_scan_m=0.0
     )
@@ -95,8 +99,11 @@ def test_drones_go_to_a_large_group_past_a_small_one_and_to_small_ones_at_last_b
     x, y, _ = np.unravel_index(NearestFrontier().pick(scene), DRONE.grid.shape)
     assert x == 46  # the body, of three voxels, touches the last known ones at 49
     assert len(scene.paths.frontiers_within(20.0)[0]) == 0 and len(scene.paths.frontiers_within(40.0)[0]) > 0
-    x, y, _ = np.unravel_index(NearestFrontier().pick(hall([sliver])), DRONE.grid.shape)
-    assert abs(x - 15) <= 4 and y <= 6
+    behind_a_wall = hall([sliver, wall], walls=(30,))
+    for scene in (hall([sliver]), behind_a_wall):
+        x, y, _ = np.unravel_index(NearestFrontier().pick(scene), DRONE.grid.shape)
+        assert abs(x - 15) <= 4 and y <= 6
+    assert len(behind_a_wall.paths.frontiers_within(20.0)[0]) == 0
 
 
 def test_a_group_that_shrinks_or_is_dropped_is_large_no_longer_by_hand():

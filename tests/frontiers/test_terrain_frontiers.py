@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from entropy_explore_env.frontiers.blocks import EDGES_STALE, NONE, mark_around, replace_unreached
+from entropy_explore_env.frontiers.blocks import FIND_EDGES, NONE, mark_around, replace_unreached
 from entropy_explore_env.frontiers.terrain_frontiers import (
     fill_column_costs,
     new_terrain_map,
@@ -153,11 +153,11 @@ def test_a_block_gives_a_column_that_was_reached_or_has_room_left():
     assert terrain.columns.candidate[0] == far
     assert set(terrain.voxel[terrain.voxel != NONE] // 8) == {far}
     terrain.excluded[near * 8 :][:8] = 1
-    mark_around(terrain.columns, 0, 0, EDGES_STALE)
+    mark_around(terrain.columns, 0, 0, FIND_EDGES)
     update_columns(terrain)
     assert terrain.columns.candidate[0] == far  # nothing is left above the middle one
     terrain.excluded[far * 8 :][:8] = 1
-    mark_around(terrain.columns, 0, 0, EDGES_STALE)
+    mark_around(terrain.columns, 0, 0, FIND_EDGES)
     update_columns(terrain)
     assert terrain.columns.candidate[0] == NONE and (terrain.voxel == NONE).all()
 

@@ -12,7 +12,7 @@ from scipy import ndimage
 from entropy_explore_env.frontiers.blocks import (
     CANDIDATE,
     DROPPED,
-    EDGES_STALE,
+    FIND_EDGES,
     NONE,
     mark_around,
     new_blocks,
@@ -113,7 +113,7 @@ def test_in_space_voxels_change_to_and_fro_and_edges_are_dropped_and_restored(sh
         blocks.flags[dropped.ravel()] |= DROPPED
         blocks.flags[~dropped.ravel()] &= np.uint8(0xFF ^ DROPPED)
         for voxel in np.flatnonzero(dropped != before):
-            mark_around(blocks, voxel, blocks.reach, EDGES_STALE)
+            mark_around(blocks, voxel, blocks.reach, FIND_EDGES)
         updated(frontiers, mean, precision)
         state = state_of(mean, precision)
         free = (state & (UNMAPPED | COVERED) == 0).astype(int)

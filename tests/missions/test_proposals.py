@@ -75,7 +75,7 @@ def test_a_view_is_proposed_what_a_mission_is(drift):
                 np.testing.assert_array_equal(proposer.features(robot), parts["candidates"])
                 np.testing.assert_array_equal(proposer.context(robot), parts["context"])
                 np.testing.assert_array_equal(proposer.overlaps(robot), parts["overlaps"])
-                variance, covariance = proposer._proposers[0].exact.pose_variance, view.covariance
+                variance, covariance = proposer._proposers[0].refined.pose_variance, view.covariance
                 assert variance[0] == pytest.approx(np.trace(covariance[:3, :3]) / 0.5**2)
                 assert variance[1] == covariance[3, 3]
         wander(fresh, 1, 7)

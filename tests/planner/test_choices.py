@@ -9,7 +9,6 @@ from entropy_explore_env.frontiers.blocks import NONE
 from entropy_explore_env.planner.model import new_proposers
 from entropy_explore_env.planner.recipe import (
     ALL_AROUND,
-    ALL_AROUND_DENSELY,
     MANY_RAYS,
     NARROW_PLANNED,
     NARROW_STRAIGHT,
@@ -21,6 +20,7 @@ from entropy_explore_env.planner.states import PlannerState, next_state
 from entropy_explore_env.planner.thresholds import DEPLETED_SCANS
 from entropy_explore_env.planner.tour import Tour
 from entropy_explore_env.settings.changes import with_settings
+from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import SCENARIOS
 from tests.planner.scenes import cell, corridor, scene_of, varied
 
@@ -37,17 +37,38 @@ from tests.planner.scenes import cell, corridor, scene_of, varied
     ],
 )
 def test_the_recipe_is_that_of_the_robot(name, recipe):
-    assert recipe_for(SCENARIOS[name].kinds[0]) is recipe
+    assert recipe_for(SCENARIOS[name], SCENARIOS[name].kinds[0]) is recipe
 
 
-def test_of_many_rays_a_quarter_is_imagined_and_a_sixteenth_where_viewpoints_are_drawn():
-    sensor = {"field_of_view_rad": (2.0 * math.pi, 1.2), "angular_step_rad": math.pi / 60, "max_range_m": 5.0}
-    many = with_settings(SCENARIOS["office-3d"], {"sensor": sensor, "action": {"kind": "candidates"}})
-    assert many.kinds[0].sensor.rays == 120 * 23 > MANY_RAYS
-    assert recipe_for(many.kinds[0]) is ALL_AROUND_DENSELY
+@pytest.mark.parametrize(
+    ("rows", "seen_share", "voxel_size_m", "thinnings"),
+    [
+        (17, 0.99, 0.1, (2, 4)),
+        (16, 0.99, 0.1, (1, 1)),  # fewer than MANY_RAYS
+        (17, None, 0.1, (1, 2)),
+        (17, 0.99, 0.4, (1, 2)),
+    ],
+)
+def test_of_many_rays_a_quarter_is_imagined_where_drones_look_for_the_unseen_in_fine_grids(
+    rows, seen_share, voxel_size_m, thinnings
+):
+    step_rad = math.pi / 60
+    view_rad = (2.0 * math.pi, (rows - 0.5) * step_rad)
+    many = with_settings(
+        SCENARIOS["office-3d"],
+        {
+            "sensor": {"field_of_view_rad": view_rad, "angular_step_rad": step_rad},
+            "robot": {"reach_m": 10.0},
+            "grid": Grid((200, 100, 20), voxel_size_m),
+            "ending": {"seen_share": seen_share},
+            "track_truth": True,
+            "action": {"kind": "candidates"},
+        },
+    )
+    assert many.kinds[0].sensor.rays == 120 * rows and (120 * rows >= MANY_RAYS) == (rows == 17)
     proposer = new_proposers(many)[0]
-    counts = [(len(scan.yaws), len(scan.pitches)) for scan in (proposer.exact, proposer.drawn)]
-    assert counts == [(60, 11), (30, 5)]
+    for scan, thinning in zip((proposer.refined, proposer.drawn), thinnings, strict=True):
+        assert (len(scan.yaws), len(scan.pitches)) == (120 // thinning, rows // thinning)
 
 
 def test_gazes_of_scanners_vary_between_rays_and_of_others_by_half_a_view():

@@ -26,7 +26,7 @@ class Moment:
         missions = env.missions
         state, scenario = missions.state, missions.scenario
         grid, kind = scenario.grid, scenario.kind_of(robot)
-        self.grid, self.kind, self.recipe = grid, kind, recipe_for(kind)
+        self.grid, self.kind, self.recipe = grid, kind, recipe_for(scenario, kind)
         self.rows = observations["candidates"][mission, robot].astype(float)
         self.context = observations["context"][mission, robot].astype(float)
         self.overlaps = observations["overlaps"][mission, robot].astype(float)

@@ -55,7 +55,7 @@ def test_to_see_all_a_scan_failed_if_what_it_was_to_show_is_still_unknown(known,
         last = knowledge(ALONG_X, 1e6 if part else 0.0)
         propose(proposer, situation._replace(knowledge=last), candidates, False)
         assert situation.experience["failures"] == (failures if part else 0)
-        found = expected_bits(situation.belief, proposer.exact, ALONG_X, proposer.scratch.scan)
+        found = expected_bits(situation.belief, proposer.refined, ALONG_X, proposer.scratch.scan)
         candidates[0]["viewpoint"] = ALONG_X
         candidates[0]["kind"], candidates[0]["bits"] = Kind.SPOT, found
         if known:

@@ -147,10 +147,10 @@ def test_a_viewpoint_is_worth_the_number_of_scans_that_pays_most(most):
     start_paths(proposer, situation)
     options = scratch.pool[:2]
     options["viewpoint"] = [(*HERE[:3], 0.0, 0.0), (18.5, 18.5, 0.5, 0.0, 0.0)]
-    evaluate(proposer, situation, proposer.exact, options, False)
+    evaluate(proposer, situation, proposer.refined, options, False)
     values = {1: [], most: []}
     for option in options:
-        fill_bits(situation.belief, proposer.exact, option["viewpoint"], scratch.scan)
+        fill_bits(situation.belief, proposer.refined, option["viewpoint"], scratch.scan)
         found = [
             scratch.scan.bits[n] / (option["seconds"] + (2**n - 1) * drive.scan_time_s) ** ALL_AROUND.exponent
             for n in range(1 + int(math.log2(most)))

@@ -117,7 +117,7 @@ def far_kinds(most_bits):
     sensor = RangeSensor((math.pi / 6, math.pi / 12), math.pi / 36, max_range_m=4.0)
     box = free_box(grid=Grid((31, 11, 5), 0.5), robots=1, robot=robot, sensor=sensor, action=FEW)
     missions = started(box, seed=3)
-    assert recipe_for(missions.scenario.kinds[0]) is NARROW_PLANNED
+    assert recipe_for(missions.scenario, missions.scenario.kinds[0]) is NARROW_PLANNED
     put(missions, 0, [1.25, 2.75, 1.25, 0.0, 0.0])
     mean = missions.state.mean[0, 0].reshape(31, 11, 5)
     precision = missions.state.precision[0, 0].reshape(31, 11, 5)

@@ -41,11 +41,11 @@ def test_where_a_mission_ends_by_what_is_seen_known_voxels_bring_nothing():
     """Four of the seven voxels are known: the others count, as do far places' unknown voxels alone."""
     bits = {}
     for scenario in (ONE_RAY, BY_SEEN):
-        recipe = recipe_for(scenario.kinds[0])._replace(stop_probability=0.0, gap_probability=0.0)
+        recipe = recipe_for(scenario, scenario.kinds[0])._replace(stop_probability=0.0, gap_probability=0.0)
         proposer = new_proposers(scenario, recipe)[0]
         precision, situation = unknown_world()
         precision[:4, 5, 2] = 100.0
-        scan = proposer.exact
+        scan = proposer.refined
         sensor = scenario.sensor
         gain = (sensor.sigma_min + sensor.sigma_slope_per_m * 3.25) ** -2
         found = expected_bits(situation.belief, scan, ALONG_X, proposer.scratch.scan)

@@ -62,9 +62,8 @@ def server(monkeypatch, tmp_path):
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "worlds"))
     monkeypatch.setenv("NO_PROXY", "127.0.0.1")
     handler = type("Handler", (Answers,), {"asked": []})
-    with http.server.HTTPServer(
-        ("127.0.0.1", 0), handler
-    ) as serving:  # one thread: it closes all its sockets
+    # It answers in the one thread, which is joined, so that all its sockets are closed.
+    with http.server.HTTPServer(("127.0.0.1", 0), handler) as serving:
         thread = threading.Thread(target=functools.partial(serving.serve_forever, poll_interval=0.01))
         thread.start()
         monkeypatch.setattr(fetching, "HOST", f"http://127.0.0.1:{serving.server_port}")
