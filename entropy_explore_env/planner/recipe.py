@@ -103,7 +103,8 @@ def recipe_for(scenario: Scenario, kind: RobotKind) -> Recipe:
     """Return the recipe of a kind of robot in a scenario.
 
     Where scanners of many rays look for what was not seen, in grids that are fine for them, one ray in two
-    columns and rows tells as much. Bits that are expected are then compared with no bits of a scan.
+    columns and rows tells as much. Elsewhere expected bits are compared with those that a scan brought, so
+    that all rays are imagined for refined viewpoints.
     """
     if not sees_all_around(kind.sensor):
         return NARROW_PLANNED if kind.robot.navigator == "planned" else NARROW_STRAIGHT
