@@ -33,7 +33,7 @@ class Fiducials:
         own_number: Number of landmarks that each robot keeps in its own map, 0 to 64: corners that it chooses
             in its scans and sights again like fiducials. They take back the error added since it chose
             them, and no more.
-        own_score: Least worth of a landmark of its own map (Sujan, eq. 17), 0 to 2: `belief.landmark_score`.
+        own_score: Least worth of a landmark of its own map (Sujan, eq. 17), 0 to 2: `missions.landmarks`.
         own_apart_m: Least distance between two landmarks of its own map, 0 to 1e6.
     """
 

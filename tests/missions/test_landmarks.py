@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.belief.fields import Belief
-from entropy_explore_env.belief.landmark_score import landmark_score
+from entropy_explore_env.missions.landmarks import landmark_score
 from entropy_explore_env.missions.view import view_of
 from entropy_explore_env.settings.grid import Grid
 from tests.reference.scenes import build, free_box, put, started, toward

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 
 from entropy_explore_env.belief.fields import Belief, occupancy_probability
-from entropy_explore_env.belief.landmark_score import landmark_score
+from entropy_explore_env.missions.landmarks import landmark_score
 from entropy_explore_env.robots.landmarks import (
     LANDMARK,
     added_since,

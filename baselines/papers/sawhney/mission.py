@@ -9,20 +9,24 @@ later than the last robot arrives.
 
 from __future__ import annotations
 
+import io
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
+from matplotlib import cbook
 
 from baselines.experiments.mission import run_mission
 from baselines.experiments.rows import Record
-from baselines.papers.sawhney.terrain_model import CEILING_M, model_file
 from baselines.strategies.allocation import ExplorationConfig
 from baselines.strategies.rules.per_time_visibility import PerTimeVisibility
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.reports.metrics import joint_figures, mission_figures
 from entropy_explore_env.settings.scenario import Scenario
+from entropy_explore_env.writing import write_atomically
 
 MARKS = (0.5, 0.9, 0.95, 0.99)
 """Explored shares at which the time is taken."""
@@ -97,3 +101,32 @@ def _reached(times_s: Sequence[float], shares: Sequence[float], mark: float, lim
 def _over_model(scenario: Scenario) -> EntropyExploreEnv:
     """Return an environment over the model of real ground, kept for the next mission."""
     return EntropyExploreEnv(scenario, world={"path": model_file(), "ceiling_m": CEILING_M})
+
+
+CEILING_M = 4.0
+"""Height of the exposure surface above the ground."""
+_FOLDER = tempfile.TemporaryDirectory(prefix="entropy_explore_env-")
+ACROSS, UP = 400.0, 50.0
+"""Scales of the model."""
+_METRES_PER_DEGREE = 111_195.0
+"""Along a meridian."""
+
+
+@lru_cache(maxsize=1)
+def model_file() -> str:
+    """Return the path of a model of real ground to fly over, a height map that `load_world` reads.
+
+    It is written for this process from the elevations of Jacksboro, Tennessee, that come with matplotlib.
+    30 × 32 km become 1 : 400, as wide as the other terrains; 840 m become 1 : 50, as high as they are. The
+    ridges of the fault stand out as they do in pictures of it, eight times as steep as they are.
+    """
+    with np.load(
+        cbook.get_sample_data("jacksboro_fault_dem.npz", asfileobj=False), allow_pickle=False
+    ) as dem:
+        elevation_m, middle = dem["elevation"] / UP, 0.5 * np.radians(dem["ymin"] + dem["ymax"])
+        spacing_m = np.array([dem["dx"] * np.cos(middle), dem["dy"]]) * _METRES_PER_DEGREE / ACROSS
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, elevation=elevation_m, spacing_m=spacing_m)
+    path = Path(_FOLDER.name) / "jacksboro.npz"
+    write_atomically(path, buffer.getvalue())
+    return str(path)

@@ -13,8 +13,8 @@ from baselines.experiments.trials import Cell, CellTrial, trials_of
 from baselines.papers import sawhney
 from baselines.papers.sawhney import EXPERIMENT, sweep
 from baselines.papers.sawhney.claims import all_claims, best_beta, compared, relative
+from baselines.papers.sawhney.mission import model_file
 from baselines.papers.sawhney.sweep import PLANS
-from baselines.papers.sawhney.terrain_model import model_file
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.worlds.load import load_world
