@@ -80,8 +80,6 @@ def start_drive(team, collision, choice, index, time_s, work):
     driven_m = driven * own.voxel_size_m
     if rest_on_path(own, robot, rests, work.braking):
         driven_m = robot.path_m
-    if code != _ARRIVED and code != _CORNERS:
-        robot.blocked_moves += 1
     robot.move_end = code
     drive_s = duration_of(SpeedProfile(driven_m, robot.lead_s, own.max_speed_m_s, own.acceleration_m_s2))
     turn_s = turning_time(robot.origin[3], robot.origin[4], goal[3], goal[4], own.turn_rate_rad_s)
@@ -146,7 +144,7 @@ def leave_path(params, robot, time_s, braking):
     """Give up the rest of a robot's drive, if it is under way, and note how it can come to rest on it.
 
     Args:
-        robot: ROBOT; its speed is noted, and a blocked end that it does not reach is not counted.
+        robot: ROBOT; its speed is noted.
         braking: (W, 3) float64, filled in; see Workspace.
 
     Returns:
@@ -159,8 +157,6 @@ def leave_path(params, robot, time_s, braking):
         robot.lead_s = robot.scan_lead_m = 0.0
         return 0
     braking_m = braking_metres(params, robot, time_s)
-    if robot.move_end != _ARRIVED and robot.move_end != _CORNERS:
-        robot.blocked_moves -= 1
     if not math.isinf(params.scan_every_m):
         robot.scan_lead_m = min(since_scan_m(params, robot, time_s), params.scan_every_m)
     behind = place_at(params, robot, time_s)[3]
@@ -263,12 +259,20 @@ def redecide(robot, time_s):
 @lean_kernel
 def stop(params, robot, time_s):
     """Let a robot decide after the scan where its drive ended; behind a teammate it may wait first."""
+    if ends_blocked(robot):
+        robot.blocked_moves += 1
     robot.waiting = params.blocked_wait_s > 0.0 and robot.move_end == _TEAMMATE
     robot.deciding = not robot.waiting
     robot.ready_s = time_s + params.blocked_wait_s if robot.waiting else time_s
     robot.next_scan_s = robot.ready_s
     robot.under_way = robot.path_blocked = False
     robot.redecide_s = math.inf
+
+
+@lean_kernel
+def ends_blocked(robot):
+    """Return whether a robot's drive ends short of the end of its path."""
+    return robot.move_end != _ARRIVED and robot.move_end != _CORNERS
 
 
 @lean_kernel
@@ -279,7 +283,8 @@ def halt(params, robot, time_s, until_s):
         until_s: When it decides; inf = never.
     """
     here = pose_at(params, robot, time_s)
-    if share_left(params, robot, time_s) > 0.0 and (robot.move_end == _ARRIVED or robot.move_end == _CORNERS):
+    scanning = not robot.deciding and not robot.waiting
+    if share_left(params, robot, time_s) > 0.0 or (scanning and ends_blocked(robot)):
         robot.blocked_moves += 1
     copy_numbers(here, robot.origin, 5)
     copy_numbers(here, robot.goal, 5)
@@ -347,8 +352,7 @@ def end_drive(params, robot, passed, time_s):
     copy_numbers(robot.scan_pose, robot.goal, 5)
     robot.corners, robot.path_m = passed, driven_m
     robot.ready_s, robot.next_scan_s, robot.deciding = time_s, time_s, True
-    if robot.move_end == _ARRIVED or robot.move_end == _CORNERS:
-        robot.blocked_moves += 1
+    robot.blocked_moves += 1
     robot.move_end = _SEEN
 
 

@@ -58,7 +58,7 @@ CROWDS = {
     "big bodies in the tiny box": (with_settings(TIGHT, {"ending": ENDLESS}), 100),
     "a plan": (with_settings(OFFICE, OFFICE_CROWD), 150),
     "scans that end planned drives": (SCANNING, 900),
-    "three sizes that plan": (THREE_SIZES, 120),
+    "three sizes that plan": (THREE_SIZES, 240),
 }
 
 
