@@ -14,7 +14,7 @@ from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import Costs
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.localization import believed_pose, estimate_in, pose_variance
-from entropy_explore_env.missions.observation.own_state import entropy_left
+from entropy_explore_env.missions.observation.robots import entropy_left
 from entropy_explore_env.missions.poses import copy_numbers, grid_size, pose_at, to_grid_units, within_grid
 from entropy_explore_env.missions.records import MissionEnd
 from entropy_explore_env.missions.silence import silent_since

@@ -27,11 +27,12 @@ from entropy_explore_env.missions.events import (
     MESSAGE_ARRIVES,
     NO_EVENT,
     ROBOT_STOPS,
+    InFlight,
     events_handled,
+    in_flight_of,
     next_event,
 )
 from entropy_explore_env.missions.faults import faults_of, note_stop
-from entropy_explore_env.missions.in_flight import InFlight, in_flight_of
 from entropy_explore_env.missions.localization import estimate_of, localization_of, note_motion
 from entropy_explore_env.missions.messages import Maps, Team, Tracer, announce, receive
 from entropy_explore_env.missions.own_maps import summaries_of

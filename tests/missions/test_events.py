@@ -8,9 +8,8 @@ import sys
 import numpy as np
 import pytest
 
-from entropy_explore_env.missions.events import events_handled, next_event
+from entropy_explore_env.missions.events import InFlight, events_handled, next_event
 from entropy_explore_env.missions.faults import TeamFaults
-from entropy_explore_env.missions.in_flight import InFlight
 from entropy_explore_env.missions.phases import TeamPhases
 from entropy_explore_env.missions.records import FAULT, MESSAGE, ROBOT
 from entropy_explore_env.missions.rules import PARAMS

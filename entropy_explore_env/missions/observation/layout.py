@@ -46,11 +46,12 @@ import numpy as np
 from gymnasium import spaces
 
 from entropy_explore_env.belief.raycast import longest_crossing
-from entropy_explore_env.missions.observation.overview import OVERVIEW_CHANNELS
-from entropy_explore_env.missions.observation.own_state import DRIVE_VALUES, SELF_VALUES
-from entropy_explore_env.missions.observation.patch import PATCH_CHANNELS
-from entropy_explore_env.missions.observation.predicted import PREDICTION_CHANNELS
-from entropy_explore_env.missions.observation.team import TEAMMATE_VALUES
+from entropy_explore_env.missions.observation.belief import (
+    OVERVIEW_CHANNELS,
+    PATCH_CHANNELS,
+    PREDICTION_CHANNELS,
+)
+from entropy_explore_env.missions.observation.robots import DRIVE_VALUES, SELF_VALUES, TEAMMATE_VALUES
 from entropy_explore_env.missions.rules import Rules, action_count, overview_shape, rules_of
 from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
 from entropy_explore_env.settings.scenario import Scenario

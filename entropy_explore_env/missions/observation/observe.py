@@ -8,13 +8,14 @@ import numpy as np
 
 from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.missions.localization import believed_pose, estimate_in
+from entropy_explore_env.missions.observation.belief import (
+    observe_overview,
+    observe_panorama,
+    observe_patch,
+    observe_prediction,
+)
 from entropy_explore_env.missions.observation.mask import observe_mask
-from entropy_explore_env.missions.observation.overview import observe_overview
-from entropy_explore_env.missions.observation.own_state import observe_drive, observe_self
-from entropy_explore_env.missions.observation.panorama import observe_panorama
-from entropy_explore_env.missions.observation.patch import observe_patch
-from entropy_explore_env.missions.observation.predicted import observe_prediction
-from entropy_explore_env.missions.observation.team import observe_team
+from entropy_explore_env.missions.observation.robots import observe_drive, observe_self, observe_team
 from entropy_explore_env.missions.poses import pose_at, speed_at, within_grid
 
 
