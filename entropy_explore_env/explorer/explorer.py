@@ -242,7 +242,7 @@ class Explorer:
         self._ground.room_for_scan(place, sensor)
         self._follow()
         workspace = self._ground.workspace
-        at = self._in_canvas(workspace, number, place, "pose")
+        at = workspace.placed(number, place, "pose")
         if points:
             hits = turned_by(values, -workspace.canvas.yaw_rad)
             hits[:, 2] = at[2] if workspace.canvas.grid.flat else hits[:, 2]
@@ -271,7 +271,7 @@ class Explorer:
             robot: Number of the robot that decides.
             ended: How its latest drive ended; None = it arrived if it is near to its goal, or had none, and
                 is under way otherwise. A drive that was blocked is not tried again at once.
-            time_s: Now; None = when the robot should be done with its latest goal.
+            time_s: Now; None = as late as the robot should need for what it has done of its latest goal.
 
         Raises:
             CallOrderError: Neither a map nor a scan was given.
@@ -282,9 +282,7 @@ class Explorer:
         given = poses_by_number(poses, len(self._seats))
         if number not in given:
             raise SettingError("poses", sorted(given), f"poses, that of robot {number} among them")
-        placed = {
-            mate: self._in_canvas(workspace, mate, pose, f"poses[{mate}]") for mate, pose in given.items()
-        }
+        placed = {mate: workspace.placed(mate, pose, f"poses[{mate}]") for mate, pose in given.items()}
         for mate, pose in placed.items():
             if workspace.is_wall(pose):
                 raise SettingError(
@@ -292,9 +290,9 @@ class Explorer:
                 )
         if ended is not None and not isinstance(ended, MoveEnd):
             raise SettingError("ended", ended, "a MoveEnd, or None")
-        now_s = self._checked_time(time_s, number)
         seat, pose = self._seats[number], placed[number].copy()
         end = self._move_end(seat, pose, number) if ended is None else ended
+        now_s = self._checked_time(time_s, workspace, number, pose, end)
         if end is MoveEnd.ARRIVED:
             self._settle(seat, pose, number)
         self._time_s = now_s
@@ -317,30 +315,20 @@ class Explorer:
         why = Why.RETURNS if homewards else purpose_of(outlook.bits, end)
         return self._told(workspace, given[number], viewpoint, outlook, why)
 
-    def _in_canvas(self, workspace: Workspace, robot: int, pose: np.ndarray, name: str) -> np.ndarray:
-        """Return a pose in the canvas's frame; that of a robot that stays in a plane lies in it."""
-        placed, plane_m = turned_by(pose, -workspace.canvas.yaw_rad), workspace.scenario.plane_m(robot)
-        if plane_m is not None:
-            placed[2] = plane_m
-        if workspace.voxel_of(placed) is None:
-            low = np.asarray(workspace.canvas.grid.origin_m)
-            high = low + workspace.canvas.grid.size_m
-            turned = f", turned by {workspace.canvas.yaw_rad:g} rad" if workspace.canvas.yaw_rad else ""
-            allowed = (
-                f"a place on the map, from {low.round(3).tolist()} to {high.round(3).tolist()} m{turned}"
-            )
-            raise SettingError(name, pose.tolist(), allowed)
-        return placed
-
     def _checked_robot(self, robot: object) -> int:
         if not is_whole(robot, 0, len(self._seats) - 1):
             raise SettingError("robot", robot, f"a whole number from 0 to {len(self._seats) - 1}")
         return int(robot)
 
-    def _checked_time(self, time_s: object, robot: int) -> float:
-        """Return the time of a decision."""
+    def _checked_time(
+        self, time_s: object, workspace: Workspace, robot: int, pose: np.ndarray, end: MoveEnd
+    ) -> float:
+        """Return the time of a decision, given or by how much of its latest goal the robot has done."""
         if time_s is None:
-            return max(self._time_s, self._seats[robot].due_s)
+            seat, left_s = self._seats[robot], 0.0
+            if end is MoveEnd.UNDER_WAY and seat.target is not None:
+                left_s = workspace.outlook(robot, pose, seat.target).seconds
+            return max(self._time_s, seat.due_s - left_s)
         if not is_number(time_s) or not self._time_s <= time_s < np.inf:
             raise SettingError("time_s", time_s, f"finite seconds, not before {self._time_s:g}")
         return float(time_s)

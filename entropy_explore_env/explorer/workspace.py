@@ -10,6 +10,7 @@ import numpy as np
 from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.paths.lattice import NO_FLY_NOWHERE
 from entropy_explore_env.belief.paths.search import Search
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.explorer.canvas import Canvas
 from entropy_explore_env.missions.records import WAYPOINTS
 from entropy_explore_env.missions.rules import rules_of
@@ -17,6 +18,7 @@ from entropy_explore_env.robots.given_scans import aim_at_points, fuse_given
 from entropy_explore_env.robots.motion import driving_time, turning_time
 from entropy_explore_env.robots.navigator import Navigator, new_navigators, plan_path
 from entropy_explore_env.robots.range_sensor import first_rays, new_scan, sensor_model
+from entropy_explore_env.robots.rotations import turned_by
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import RobotModel, new_scratch, robot_model
 from entropy_explore_env.viewpoints.expected_scan import expected_bits
@@ -79,6 +81,26 @@ class Workspace:
         shape = self.canvas.grid.shape
         inside = 0 <= x < shape[0] and 0 <= y < shape[1] and 0 <= z < shape[2]
         return (x, y, z) if inside else None
+
+    def placed(self, robot: int, pose: np.ndarray, name: str) -> np.ndarray:
+        """Return a pose of the map frame in the canvas's; that of a robot that stays in a plane lies in it.
+
+        Raises:
+            SettingError: It is outside the canvas; `name` says whose pose it is.
+        """
+        canvas, plane_m = self.canvas, self.scenario.plane_m(robot)
+        placed = turned_by(pose, -canvas.yaw_rad)
+        if plane_m is not None:
+            placed[2] = plane_m
+        if self.voxel_of(placed) is None:
+            low = np.asarray(canvas.grid.origin_m)
+            high = low + canvas.grid.size_m
+            turned = f", turned by {canvas.yaw_rad:g} rad" if canvas.yaw_rad else ""
+            allowed = (
+                f"a place on the map, from {low.round(3).tolist()} to {high.round(3).tolist()} m{turned}"
+            )
+            raise SettingError(name, pose.tolist(), allowed)
+        return placed
 
     def is_wall(self, pose: np.ndarray) -> bool:
         """Return whether the voxel of a pose was measured, and is believed covered."""

@@ -326,6 +326,18 @@ def test_bad_input_is_named_and_changes_nothing(seen_from_start):
     assert np.array_equal(*goals)
 
 
+def test_without_a_clock_time_passes_as_the_robot_drives_however_often_it_is_asked(seen_from_start):
+    explorer = Explorer(voxel_size_m=EDGE_M)
+    explorer.set_map(seen_from_start)
+    looked_s = explorer.goal(START).seconds  # around, on the spot
+    for _ in range(10):
+        goal = explorer.goal(START)
+    explorer.goal(START, time_s=looked_s + 1e-6)
+    explorer.goal(np.append(0.5 * (START[:3] + goal.path[0]), START[3:]))
+    with pytest.raises(SettingError, match="time_s"):
+        explorer.goal(START, time_s=looked_s + 0.3 * goal.seconds)
+
+
 def test_beams_beyond_the_range_say_that_they_are_free_up_to_it():
     near, far = (Explorer("office") for _ in range(2))
     pose = np.array([12.0, 9.0, 0.05, 0.0, 0.0])
