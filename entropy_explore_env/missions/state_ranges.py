@@ -99,7 +99,7 @@ def _bounds(scenario: Scenario, arrays: Arrays) -> dict[str, float | np.ndarray]
         "cycles": MOST if ending.max_cycles is None else ending.max_cycles,
         "time_s": clock["time_s"],
         "soon_s": clock["time_s"] + 1e9,
-        "next_s": clock["time_s"] + (math.inf if scenario.faults.stop.happens else 1e9),
+        "next_s": math.inf if scenario.faults.stop.happens else clock["time_s"] + 1e9,
         "due_s": clock["time_s"] + scenario.longest_delay_s,
         "enqueued": clock["enqueued"],
         "voxels": scenario.grid.voxels,
