@@ -181,6 +181,10 @@ class Explorer:
                 nothing that is known. Nothing has changed then.
         """
         if isinstance(grid, Map):
+            if origin is not None or values is not None or bottom_m != 0.0:
+                raise SettingError(
+                    "grid", grid, "an array beside origin, bottom_m or values, which a Map has"
+                )
             self._take_map(patch_of_map(grid, self._task))
             return
         given = occupancies_of(grid, values, unknown_between)
@@ -202,7 +206,7 @@ class Explorer:
             allowed = f"voxel_size_m, which is {self._task.grid.voxel_size_m:g}"
             raise SettingError("message.info.resolution", about.resolution_m, allowed)
         bottom_m = 0.0 if self._task.planar else about.bottom_m
-        self.set_map(about.grid, about.origin, bottom_m=bottom_m, **how)
+        self.set_map(about.grid, about.origin, bottom_m=bottom_m, **{"values": "percent", **how})
 
     def _take_map(self, patch: Patch) -> None:
         """Write a map into the canvas, and say to each robot what that brought in view of its target."""
@@ -231,7 +235,13 @@ class Explorer:
                 Nothing has changed then.
         """
         number, place = self._checked_robot(robot), checked_pose("pose", pose)
-        values = np.array(measured, np.float64) if isinstance(measured, np.ndarray) else np.zeros((0, 0))
+        try:
+            values = np.array(measured, np.float64)
+        except (TypeError, ValueError):
+            allowed = (
+                "an array of numbers: ranges (R,), or points (N, 3), as of sensor_msgs_py's read_points_numpy"
+            )
+            raise SettingError("measured", measured, allowed) from None
         sensor, points = self._task.kind_of(number).sensor, values.ndim == 2 and values.shape[1] == 3
         rays = sensor.columns if self._ground.flat else sensor.rays
         if points and not np.isfinite(values).all():

@@ -78,13 +78,15 @@ class Navigation:
     def hear_map(self, message: Any) -> bool:  # noqa: ANN401
         """Take a nav_msgs/OccupancyGrid; return whether it could be used."""
         try:
-            if self._explorer is None:
+            explorer = self._explorer
+            if explorer is None:
                 size_m = float(f"{float(message.info.resolution):.6g}")  # a float32 in the message
-                self._explorer = Explorer(voxel_size_m=size_m, **self._settings)
-            self._explorer.set_map_message(message)
+                explorer = Explorer(voxel_size_m=size_m, **self._settings)
+            explorer.set_map_message(message)
         except SettingError as error:
             self.trouble = str(error)
             return False
+        self._explorer = explorer
         return True
 
     def hear_pose(self, robot: int, position: Any, orientation: Any) -> None:  # noqa: ANN401

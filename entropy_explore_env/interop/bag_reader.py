@@ -35,6 +35,8 @@ _GRID, _TREE = "nav_msgs/msg/OccupancyGrid", "octomap_msgs/msg/Octomap"
 _CLOUD, _ODOMETRY, _TF = "sensor_msgs/msg/PointCloud2", "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
 _BASES = ("base_footprint", "base_link")
 """Frames of a robot in bags without Odometry."""
+_MAP = "/map"
+"""Topic of a robot's map, beside which others are costmaps."""
 _FLOATS = {7: "f4", 8: "f8"}
 _MOST_LINKS = 100
 
@@ -98,14 +100,16 @@ def points_of_cloud(message: Any) -> np.ndarray:  # noqa: ANN401 - a PointCloud2
     fields = {each.name: each for each in message.fields}
     if any(axis not in fields or fields[axis].datatype not in _FLOATS for axis in "xyz"):
         raise SettingError("PointCloud2.fields", sorted(fields), "x, y and z as floats")
-    count, step = int(message.width) * int(message.height), int(message.point_step)
+    width, height, step = int(message.width), int(message.height), int(message.point_step)
     data, order = np.asarray(message.data, np.uint8), ">" if message.is_bigendian else "<"
-    if len(data) < count * step:
-        raise SettingError("PointCloud2.data", len(data), f"{count} points of {step} bytes")
+    row = max(int(message.row_step), width * step) if height > 1 else width * step  # a row may end in padding
+    if len(data) < height * row:
+        raise SettingError("PointCloud2.data", len(data), f"{height} rows of {row} bytes")
     kinds = [order + _FLOATS[fields[axis].datatype] for axis in "xyz"]
     offsets = [int(fields[axis].offset) for axis in "xyz"]
     record = np.dtype({"names": list("xyz"), "formats": kinds, "offsets": offsets, "itemsize": step})
-    rows = np.frombuffer(data[: count * step].tobytes(), record)
+    packed = data[: height * row].reshape(height, row)[:, : width * step]
+    rows = np.frombuffer(packed.tobytes(), record)
     points = np.column_stack([rows[axis].astype(np.float64) for axis in "xyz"])
     return points[np.isfinite(points).all(axis=1)]
 
@@ -120,15 +124,22 @@ class BagReader:
     """
 
     def __init__(
-        self, path: Path | str, topic: str | None = None, map_frame: str = "map", robots: Sequence[str] = ()
+        self,
+        path: Path | str,
+        topic: str | None = None,
+        map_frame: str = "map",
+        robots: Sequence[str] = (),
+        posed: bool = True,
     ) -> None:
         """Look at what a bag holds.
 
         Args:
             path: Folder of a ROS 2 bag, an .mcap or .db3 in it, or a .bag of ROS 1.
-            topic: Topic of the map or scans; None = all topics of maps, or of scans where there are no maps.
+            topic: Topic of the map or scans; None = `/map`, or else all topics of maps, or of scans where there
+                are no maps.
             map_frame: The frame in which poses are wanted.
             robots: Their frames; None given = those of Odometry, or base_footprint or base_link.
+            posed: Whether maps are wanted only with the pose of a robot.
 
         Raises:
             RecordError: There is no such bag, or it has neither maps nor scans with poses.
@@ -145,7 +156,10 @@ class BagReader:
         if not self.maps and not self.scans:
             allowed = f"a bag with an OccupancyGrid, an Octomap or PointCloud2; it has {sorted(kinds)}"
             raise RecordError("bag", str(self.path), allowed)
-        self.robots = list(robots) or self._found_robots()
+        if topic is None and _MAP in self.maps:
+            self.maps = [_MAP]
+        self._posed = posed or not self.maps
+        self.robots = list(robots) or (self._found_robots() if self._posed else [])
 
     def _take_topic(self, topic: str, kinds: dict[str, str]) -> None:
         """Keep one topic alone."""
@@ -176,21 +190,17 @@ class BagReader:
 
     def _found_robots(self) -> list[str]:
         """Return the frames of the robots."""
-        frames: list[str] = []
+        found: dict[str, list[str]] = {_ODOMETRY: [], _TF: []}
         with self._open() as reader:
-            wanted = [each for each in reader.connections if each.msgtype in (_ODOMETRY, _TF)]
-            for connection, _, raw in reader.messages(connections=wanted):
+            wanted = [each for each in reader.connections if each.msgtype in found]
+            for connection, _, raw in reader.messages(connections=wanted) if wanted else ():
                 message = reader.deserialize(raw, connection.msgtype)
-                if connection.msgtype == _ODOMETRY:
-                    frames.append(message.child_frame_id.lstrip("/"))
-                else:
-                    children = [each.child_frame_id.lstrip("/") for each in message.transforms]
-                    frames += [child for child in children if child.rsplit("/", 1)[-1] in _BASES]
-        named = list(dict.fromkeys(frames))
-        if not named:
+                placed = [message] if connection.msgtype == _ODOMETRY else message.transforms
+                found[connection.msgtype] += [each.child_frame_id.lstrip("/") for each in placed]
+        robots = _bases_of(found[_ODOMETRY]) or list(dict.fromkeys(found[_ODOMETRY])) or _bases_of(found[_TF])
+        if not robots:
             raise RecordError("bag", str(self.path), "a bag with Odometry, or tf of a base_link: poses")
-        odometry = [frame for frame in named if frame.rsplit("/", 1)[-1] not in _BASES]
-        return odometry or named[:1]
+        return robots
 
     def __iter__(self) -> Iterator[MapHeard | ScanHeard]:
         """Yield maps, or scans where there are no maps, that were recorded when a robot's pose was known.
@@ -235,11 +245,24 @@ class BagReader:
             at = message.pose.pose
             frames.hear(self._map_frame, message.child_frame_id, at.position, at.orientation)
 
+    def _carrier(self, frame: str, frames: Frames) -> int:
+        """Return the robot that carries a frame: the first one above it, or one of its namespace; else 0."""
+        at = frame
+        for _ in range(_MOST_LINKS):
+            if at in self.robots:
+                return self.robots.index(at)
+            if at not in frames.links:
+                break
+            at, _ = frames.links[at]
+        namespaces = [name.split("/")[0] for name in self.robots]
+        namespace = frame.split("/")[0]
+        return namespaces.index(namespace) if namespace in namespaces else 0
+
     def _heard(self, message: Any, kind: str, time_s: float, frames: Frames) -> MapHeard | ScanHeard | None:  # noqa: ANN401
         """Return what a map or scan says; None = its frame, or all robots, are not placed yet."""
         matrices = {number: frames.to(self._map_frame, name) for number, name in enumerate(self.robots)}
         poses = {number: pose_of_matrix(each) for number, each in matrices.items() if each is not None}
-        if not poses:
+        if self._posed and not poses:
             return None
         frame = frames.to(self._map_frame, message.header.frame_id)
         if frame is None:
@@ -249,8 +272,18 @@ class BagReader:
             origin, bottom_m = in_map_frame(corner, frame)
             return MapHeard(time_s, percent, origin, bottom_m, edge_m, poses)
         points = points_of_cloud(message) @ frame[:3, :3].T + frame[:3, 3]
-        robot = next((n for n, name in enumerate(self.robots) if name in message.header.frame_id), 0)
+        robot = self._carrier(message.header.frame_id.lstrip("/"), frames)
         return ScanHeard(time_s, robot, pose_of_matrix(frame), points, poses)
+
+
+def _bases_of(frames: list[str]) -> list[str]:
+    """Return the first frame of a robot's base in each namespace."""
+    bases: dict[str, str] = {}
+    for frame in frames:
+        namespace, _, name = frame.rpartition("/")
+        if name in _BASES:
+            bases.setdefault(namespace, frame)
+    return list(bases.values())
 
 
 def _map_of(message: Any, kind: str) -> tuple[np.ndarray, np.ndarray, float]:  # noqa: ANN401
@@ -284,10 +317,12 @@ def world_of_bag(path: Path | str, topic: str | None = None, map_frame: str = "m
     """Return the world of the last map of a bag; unknown space is solid. Arguments are as for `BagReader`.
 
     Raises:
-        RecordError, SettingError, MissingExtraError: As for `BagReader`.
+        RecordError, SettingError, MissingExtraError: As for `BagReader`; or there are several topics of maps.
         WorldError: It has no map, or one without free space.
     """
-    reader, last = BagReader(path, topic, map_frame), None
+    reader, last = BagReader(path, topic, map_frame, posed=False), None
+    if len(reader.maps) > 1:
+        raise SettingError("topic", None, one_of("", reader.maps))
     for heard in reader:
         last = heard if isinstance(heard, MapHeard) else last
     if last is None:

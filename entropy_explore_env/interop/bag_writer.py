@@ -3,7 +3,7 @@
 Topics: `/map` (OccupancyGrid) in plans or `/octomap` (Octomap) in 3-D, of what the team knows; `/tf`; and for
 each robot `/robot_N/odom` (Odometry), `/robot_N/scan` (PointCloud2 of the hits, in the robot's frame),
 `/robot_N/path` (Path of each drive) and `/robot_N/goal` (Marker, an arrow). OctoMap puts voxels at multiples
-of their edge: `/octomap` is in the frame `octomap`, which lies where the voxels of the grid do.
+of their edge: `/octomap` is in the frame `octomap`, which lies at the corner of the grid.
 """
 
 from __future__ import annotations
@@ -85,9 +85,6 @@ class BagWriter:
         self._noted_s, self._map_due_s = -1.0, 0.0
         robots = missions.scenario.robots
         self._departed_s = np.full(robots, -1.0)
-        edge_m, corner_m = missions.grid.voxel_size_m, np.asarray(missions.grid.origin_m)
-        self._octomap_m = corner_m - np.rint(corner_m / edge_m) * edge_m
-        """(3,) origin of the frame `octomap` in the map frame, at most half a voxel edge along each axis."""
 
     def __enter__(self) -> BagWriter:
         return self
@@ -171,8 +168,8 @@ class BagWriter:
         """Write where all robots are, tf and odometry, and where the octomap is."""
         header, transforms = self._header(time_s, "map"), []
         if not self._missions.grid.flat:
-            lattice = np.array([*self._octomap_m, 0.0, 0.0])
-            transforms.append(self._transform(header, "octomap", lattice))
+            corner = np.array([*self._missions.grid.origin_m, 0.0, 0.0])
+            transforms.append(self._transform(header, "octomap", corner))
         for robot, pose in enumerate(poses):
             placed, frame = self._pose(pose), f"robot_{robot}"
             transforms.append(self._transform(header, frame, pose))
@@ -273,8 +270,7 @@ class BagWriter:
         if belief.grid.flat:
             self._write_plan(belief, time_s)
         elif belief.known.any():
-            corner_m = np.asarray(belief.grid.origin_m) - self._octomap_m
-            grid = dataclasses.replace(belief.grid, origin_m=tuple(corner_m.tolist()))
+            grid = dataclasses.replace(belief.grid, origin_m=(0.0, 0.0, 0.0))
             tree = octomap_of(dataclasses.replace(belief, grid=grid), full=False)
             data = np.frombuffer(tree[tree.index(b"\ndata\n") + 6 :], np.int8)
             about = {"binary": True, "id": "OcTree", "resolution": grid.voxel_size_m, "data": data}

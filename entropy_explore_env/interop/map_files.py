@@ -11,8 +11,10 @@
 from __future__ import annotations
 
 import io
+import json
 import math
 import zipfile
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -34,6 +36,8 @@ _SHADES = {FREE: 254, SOLID: 0, UNKNOWN: SAVED_AS_UNKNOWN}
 _OCCUPIED_THRESH, _FREE_THRESH = 0.65, 0.196
 _ON_LATTICE = 1e-3
 """Voxel edges by which OctoMap's lattice, whose corners are multiples of the edge, may be missed."""
+_MOST_KEYS = 32768
+"""Voxels of OctoMap's lattice on either side of the origin."""
 
 
 def save_map(belief: Map, path: Path | str, heights_m: tuple[float, float] | None = None) -> list[Path]:
@@ -72,10 +76,10 @@ def _save_plan(belief: Map, path: Path, heights_m: tuple[float, float] | None) -
     image, buffer = path.with_suffix(".pgm"), io.BytesIO()
     Image.fromarray(np.ascontiguousarray(shades.T[::-1])).save(buffer, "PPM")
     about = {
-        "image": image.name,
+        "image": json.dumps(image.name, ensure_ascii=False),
         "mode": "trinary",
         "resolution": repr(float(grid.voxel_size_m)),
-        "origin": f"[{grid.origin_m[0]!r}, {grid.origin_m[1]!r}, {float(belief.yaw_rad)!r}]",
+        "origin": [*(float(v) for v in grid.origin_m[:2]), float(belief.yaw_rad)],
         "negate": 0,
         "occupied_thresh": _OCCUPIED_THRESH,
         "free_thresh": _FREE_THRESH,
@@ -107,7 +111,8 @@ def octomap_of(belief: Map, full: bool) -> bytes:
     """Return a map as an OctoMap tree: the binary form .bt, or the full one .ot.
 
     Raises:
-        SettingError: The grid is turned, or its corners are no multiples of the voxels' edge.
+        SettingError: The grid is turned, its corners are no multiples of the voxels' edge, or it lies too far
+            from the origin.
         MissingExtraError: octomap-python is not installed.
     """
     octomap = imported("octomap", "octomap-python", "worlds")
@@ -117,9 +122,13 @@ def octomap_of(belief: Map, full: bool) -> bytes:
         found = f"corner {grid.origin_m} m, yaw {belief.yaw_rad:g}"
         allowed = f"a map that is not turned, with its corner at multiples of {edge_m:g} m, for OctoMap"
         raise SettingError("belief", found, allowed)
+    low = np.rint(corner)
+    if (low < -_MOST_KEYS).any() or (low + grid.shape > _MOST_KEYS).any():
+        allowed = f"a map within {_MOST_KEYS * edge_m:g} m of the origin along each axis, for OctoMap"
+        raise SettingError("belief", f"corner {grid.origin_m} m", allowed)
     tree, labels = octomap.OcTree(edge_m), belief.labels()
     for label in (FREE, SOLID):
-        centres = (np.rint(corner) + np.argwhere(labels == label) + 0.5) * edge_m
+        centres = (low + np.argwhere(labels == label) + 0.5) * edge_m
         if len(centres):
             tree.updateNodes(list(centres), label == SOLID, lazy_eval=True)
     tree.updateInnerOccupancy()
@@ -136,8 +145,8 @@ def _ply_of(belief: Map) -> bytes:
     """Return the solid voxels as a binary PLY of points."""
     points = solid_points(belief)
     head = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(points)}\n"
-    head += "".join(f"property float {axis}\n" for axis in "xyz") + "end_header\n"
-    return head.encode() + points.astype("<f4").tobytes()
+    head += "".join(f"property double {axis}\n" for axis in "xyz") + "end_header\n"
+    return head.encode() + points.astype("<f8").tobytes()
 
 
 def _npz_of(belief: Map) -> bytes:
@@ -166,10 +175,11 @@ def load_map(path: Path | str) -> Map:
         return Map(grid, mean, entries["map_precision"], prior, yaw_rad)
     except OSError as error:
         raise WorldError("path", str(path), f"a file that can be read ({error.strerror})") from None
-    except (KeyError, ValueError, IndexError, TypeError, RefusedError, zipfile.BadZipFile):
+    except (LookupError, ValueError, TypeError, EOFError, RuntimeError, RefusedError, *_BROKEN_ARCHIVE):
         raise WorldError("path", str(path), "an .npz that save_map wrote") from None
 
 
+_BROKEN_ARCHIVE = (zipfile.BadZipFile, zlib.error)
 _WRITERS: dict[str, Callable[[Map], bytes]] = {
     ".bt": lambda belief: octomap_of(belief, full=False),
     ".ot": lambda belief: octomap_of(belief, full=True),

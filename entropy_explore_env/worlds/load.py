@@ -274,21 +274,27 @@ def world_from_file(path: Path | str, voxel_size_m: float, **options: Any) -> Wo
         raise SettingError("Scenario.world", str(path), allowed + did_you_mean(str(path), (*RECIPES, *NAMES)))
     options["voxel_size_m"] = voxel_size_m
     check_options(options)
-    path = path if str(path) in NAMES else path.resolve()
+    path = path if str(path) in NAMES else path.absolute()
     return _cached_world(path, _file_version(path), tuple(sorted(options.items())))
 
 
-def _file_version(path: Path) -> tuple[int, int]:
-    """Time of the last change of a file, and its size: a changed file is read again."""
+def _file_version(path: Path) -> tuple[tuple[str, int, int], ...]:
+    """Return name, time of the last change and size of a file: a changed file is read again.
+
+    A YAML names an image in its folder: all files there count.
+    """
+    files = path.parent.iterdir() if path.suffix.lower() in (".yaml", ".yml") else (path,)
     try:
-        about = path.stat()
+        found = sorted((file.name, file.stat()) for file in files)
     except OSError:  # a name, or a missing file, which reading reports
-        return 0, 0
-    return about.st_mtime_ns, about.st_size
+        return ()
+    return tuple((name, about.st_mtime_ns, about.st_size) for name, about in found)
 
 
 @lru_cache(maxsize=4)
-def _cached_world(path: Path, version: tuple[int, int], options: tuple[tuple[str, Any], ...]) -> World:
+def _cached_world(
+    path: Path, version: tuple[tuple[str, int, int], ...], options: tuple[tuple[str, Any], ...]
+) -> World:
     del version  # part of the key of the cache
     return load_world(path, **dict(options))
 

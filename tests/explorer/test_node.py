@@ -48,7 +48,7 @@ def _zero(kind):
         return _ZEROS.get(value[0], 0)
     if node == 2:  # a message
         return blank(value)
-    return [0.0] * 36 if node == 3 else []  # an array, or a sequence
+    return np.zeros(36) if node == 3 else []  # an array, or a sequence
 
 
 def grid_message(seen):
@@ -90,11 +90,14 @@ def test_an_aborted_goal_is_not_sent_again():
 
 def test_what_cannot_be_used_is_said():
     navigation = Navigation(1)
-    assert not navigation.hear_map(grid_message(np.full((4, 5), -1, np.int8)))
-    assert "something is known" in navigation.trouble
-    navigation.hear_map(grid_message(np.zeros((40, 50), np.int8)))
     far = fill_pose(blank("geometry_msgs/msg/Pose"), np.array([90.0, 0.0, 0.0, 0.0, 0.0]))
     navigation.hear_pose(0, far.position, far.orientation)
+    assert not navigation.hear_map(grid_message(np.full((4, 5), -1, np.int8)))
+    assert "something is known" in navigation.trouble
+    assert not navigation.idle() and navigation.decide(0, 1.0) is None
+    coarse = grid_message(np.ones((40, 50), np.int8))  # one per cent everywhere
+    coarse.info.resolution = 2.0 * EDGE_M
+    assert navigation.hear_map(coarse)
     assert navigation.decide(0, 1.0) is None and "a place on the map" in navigation.trouble
     assert not navigation.finished
 

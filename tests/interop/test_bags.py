@@ -33,7 +33,10 @@ from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import find_scenario
 from entropy_explore_env.worlds.files.voxels import FREE, SOLID, UNKNOWN
+from tests.explorer.test_node import blank, grid_message
 
+STORE = typestore()
+GRID, ODOMETRY, TF = "nav_msgs/msg/OccupancyGrid", "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
 TYPES = {
     "/map": "nav_msgs/msg/OccupancyGrid",
     "/tf": "tf2_msgs/msg/TFMessage",
@@ -208,6 +211,95 @@ def test_trees_are_read_without_octomap():
     for broken in (b"", east[:-2], b"\x00\x00", b"\xff" * 4000):
         with pytest.raises(SettingError, match=r"octomap.data = "):
             voxels_of_tree(broken, binary=True)
+
+
+def bag_of(path, heard):
+    """A bag of messages (topic, seconds, type, message)."""
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topics = {
+            topic: writer.add_connection(topic, kind, typestore=STORE)
+            for topic, kind in dict.fromkeys((topic, kind) for topic, _, kind, _ in heard)
+        }
+        for topic, time_s, kind, message in heard:
+            writer.write(topics[topic], int(time_s * 1e9), STORE.serialize_cdr(message, kind))
+    return path
+
+
+def grid_heard(topic, time_s, side, frame="map"):
+    message = grid_message(np.zeros((side, side), np.int8))
+    message.header.frame_id = frame
+    return topic, time_s, GRID, message
+
+
+def placed(kind, topic, time_s, links):
+    """Odometry of one frame in another, or tf."""
+    parts = []
+    for parent, child in links:
+        each = blank("nav_msgs/msg/Odometry" if kind == ODOMETRY else "geometry_msgs/msg/TransformStamped")
+        each.header.frame_id, each.child_frame_id = parent, child
+        turn = each.pose.pose.orientation if kind == ODOMETRY else each.transform.rotation
+        turn.w = 1.0
+        parts.append(each)
+    if kind == ODOMETRY:
+        return [(f"{topic}{number}", time_s, kind, each) for number, each in enumerate(parts)]
+    message = blank(kind)
+    message.transforms = parts
+    return [(topic, time_s, kind, message)]
+
+
+def cloud_heard(topic, time_s, frame):
+    """Two rows of one point, each followed by four bytes of padding."""
+    message = blank("sensor_msgs/msg/PointCloud2")
+    message.header.frame_id, message.width, message.height = frame, 1, 2
+    message.point_step, message.row_step, message.is_bigendian = 12, 16, False
+    for number, axis in enumerate("xyz"):
+        about = blank("sensor_msgs/msg/PointField")
+        about.name, about.offset, about.datatype, about.count = axis, 4 * number, 7, 1
+        message.fields.append(about)
+    rows = np.zeros((2, 4), "<f4")
+    rows[:, :3] = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
+    message.data = np.frombuffer(rows.tobytes(), np.uint8)
+    return topic, time_s, "sensor_msgs/msg/PointCloud2", message
+
+
+def test_a_map_is_a_world_whatever_else_the_bag_has(tmp_path):
+    """Recorded before any pose, and without one; a costmap beside it is not taken for it."""
+    alone = bag_of(tmp_path / "alone", [grid_heard("/map", 1.0, 30)])
+    assert world_of_bag(alone).grid.shape == (30, 30, 1)
+    with pytest.raises(RecordError, match="poses"):
+        BagReader(alone)
+    tf = placed(TF, "/tf", 2.0, [("map", "base_link")])
+    several = [grid_heard("/map", 1.0, 30), *tf, grid_heard("/local_costmap/costmap", 3.0, 6)]
+    assert world_of_bag(bag_of(tmp_path / "several", several)).grid.shape == (30, 30, 1)
+    assert world_of_bag(tmp_path / "several", "/local_costmap/costmap").grid.shape == (6, 6, 1)
+    team = [grid_heard(f"/robot_{number}/map", 1.0, 9) for number in range(2)]
+    with pytest.raises(SettingError, match=r"topic = None: expected one of /robot_0/map, /robot_1/map"):
+        world_of_bag(bag_of(tmp_path / "team", team))
+
+
+@pytest.mark.parametrize(
+    ("kind", "links", "robots"),
+    [
+        ("odometry", [("map", "r1/base_link"), ("map", "r2/base_link")], ["r1/base_link", "r2/base_link"]),
+        ("odometry", [("map", "robot_1"), ("map", "robot_10")], ["robot_1", "robot_10"]),
+        (
+            "tf",
+            [("map", "r1/base_link"), ("map", "r2/base_footprint")],
+            ["r1/base_link", "r2/base_footprint"],
+        ),
+        ("tf", [("map", "base_footprint"), ("base_footprint", "base_link")], ["base_footprint"]),
+    ],
+)
+def test_every_robot_of_a_team_is_found_and_has_its_own_scans(tmp_path, kind, links, robots):
+    heard = placed({"odometry": ODOMETRY, "tf": TF}[kind], "/placed", 1.0, links)
+    sensors = [f"{robots[-1]}/lidar", "left"]
+    heard += placed(TF, "/tf", 1.0, [(robots[-1], frame) for frame in sensors])
+    heard += [cloud_heard(f"/scan{number}", 2.0, frame) for number, frame in enumerate(sensors)]
+    reader = BagReader(bag_of(tmp_path / "team", heard))
+    assert reader.robots == robots
+    scans = [each for each in reader if isinstance(each, ScanHeard)]
+    assert [scan.robot for scan in scans] == [len(robots) - 1] * 2
+    assert scans[0].points_m.tolist() == [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]
 
 
 def test_frames_are_chained():

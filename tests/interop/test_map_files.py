@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+from pathlib import Path
+
 import numpy as np
 import octomap
 import pytest
@@ -25,12 +28,12 @@ def drawn_map(shape=(7, 11, 5), origin=(-1.5, 2.0, 0.5), yaw=0.0, seed=0):
     return Map(Grid(shape, 0.25, origin), mean, precision, 30.0, yaw), labels
 
 
-@pytest.mark.parametrize("name", ["plan.yaml", "plan.pgm"])
+@pytest.mark.parametrize("name", ["plan.yaml", "a: run #2.pgm"])
 @pytest.mark.parametrize("rule", ["nav2", "map_server"])
 def test_a_plan_is_read_back_by_the_rules_of_map_server(tmp_path, name, rule):
-    belief, labels = drawn_map((7, 11, 1), (-1.5, 2.0, 0.0), yaw=0.3)
+    belief, labels = drawn_map((7, 11, 1), tuple(np.array([-1.5, 2.0, 0.0])), yaw=0.3)
     text, image = save_map(belief, tmp_path / name)
-    assert (text.name, image.name) == ("plan.yaml", "plan.pgm")
+    assert {text.name, image.name} == {f"{Path(name).stem}{suffix}" for suffix in (".yaml", ".pgm")}
     world = load_world(text, map_rule=rule)
     assert np.array_equal(world.occupied, labels != FREE)
     assert world.unknown is not None and np.array_equal(world.unknown, labels == UNKNOWN)
@@ -66,14 +69,26 @@ def test_octomap_finds_the_same_cells(tmp_path, suffix):
     assert (world.occupied & ~world.unknown).sum() == (labels == SOLID).sum()
 
 
+@pytest.mark.parametrize(("axis", "corner_m"), [(0, -8192.0), (1, 8192.0 - 11 * 0.25)])
+def test_octomap_holds_maps_up_to_the_ends_of_its_lattice(tmp_path, axis, corner_m):
+    origin = tuple(corner_m if each == axis else 0.0 for each in range(3))
+    belief, labels = drawn_map(origin=origin)
+    world = load_world(save_map(belief, tmp_path / "map.bt")[0])
+    assert world.unknown is not None
+    assert (world.occupied & ~world.unknown).sum() == (labels == SOLID).sum()
+    beyond = np.array(origin) + np.sign(corner_m) * 0.25 * (np.arange(3) == axis)
+    with pytest.raises(SettingError, match=r"belief = .*within 8192 m of the origin"):
+        save_map(drawn_map(origin=tuple(beyond.tolist()))[0], tmp_path / "beyond.bt")
+
+
 def test_points_lie_in_the_map_frame(tmp_path):
-    belief, labels = drawn_map(yaw=np.pi / 2)
+    belief, labels = drawn_map(origin=(500_000.0 - 1.5, 5_400_002.0, 0.5), yaw=np.pi / 2)
     cloud = trimesh.load(save_map(belief, tmp_path / "map.ply")[0])
     assert isinstance(cloud, trimesh.PointCloud)
     first = np.argwhere(labels == SOLID)[0]
     x, y, z = (first + 0.5) * 0.25
     assert len(cloud.vertices) == (labels == SOLID).sum()
-    assert np.allclose(cloud.vertices[0], [-1.5 - y, 2.0 + x, 0.5 + z], atol=1e-6)
+    assert np.allclose(cloud.vertices[0] - [500_000.0, 5_400_000.0, 0.0], [-1.5 - y, 2.0 + x, 0.5 + z])
 
 
 def test_an_archive_is_a_map_and_a_world(tmp_path):
@@ -108,6 +123,11 @@ def test_what_a_form_cannot_hold_is_refused_by_name(tmp_path):
         with pytest.raises(WorldError, match="path = "):
             load_map(tmp_path / name)
     assert [path.name for path in tmp_path.iterdir()] == ["b.npz"]
+    whole = save_map(belief, tmp_path / "whole.npz")[0].read_bytes()
+    for place in range(0, len(whole), 7):
+        (tmp_path / "b.npz").write_bytes(whole[:place] + bytes([whole[place] ^ 0x55]) + whole[place + 1 :])
+        with contextlib.suppress(WorldError):
+            load_map(tmp_path / "b.npz")
 
 
 def test_the_map_of_a_team_is_there_with_and_without_the_truth():

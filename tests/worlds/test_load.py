@@ -107,6 +107,20 @@ def test_a_file_that_was_written_again_is_read_again(tmp_path):
     first = world_from_file(path, 0.05)
     path.write_bytes(pgm(np.full((30, 60), 255, np.uint8)))
     assert (first.grid.shape, world_from_file(path, 0.05).grid.shape) == ((60, 40, 1), (60, 30, 1))
+    text, plan = tmp_path / "plan.yaml", np.full((30, 60), 255, np.uint8)
+    text.write_text(
+        "image: plan.pgm\nresolution: 0.05\norigin: [0, 0, 0]\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    plan[10:20, 30] = 0
+    assert world_from_file(text, 0.05).occupied.sum() == 0
+    path.write_bytes(pgm(plan))
+    assert world_from_file(text, 0.05).occupied.sum() == 10
+
+
+def test_a_link_to_a_file_of_another_name_is_read_by_its_own_name(tmp_path):
+    (tmp_path / "0b1e").write_bytes(pgm(np.full((40, 60), 255, np.uint8)))
+    (tmp_path / "plan.pgm").symlink_to(tmp_path / "0b1e")
+    assert world_from_file(tmp_path / "plan.pgm", 0.05).grid.shape == (60, 40, 1)
 
 
 def unknown_beyond(rows):

@@ -102,7 +102,10 @@ def _coordinates(
     before = np.cumsum([0, *(field.width for field in fields)]).tolist()
     if encoding == b"ascii":
         columns = [sum(field.count for field in fields[:n]) for n in at]
-        return np.loadtxt(io.BytesIO(body), np.float64, usecols=columns, max_rows=points, ndmin=2)
+        rows = np.loadtxt(io.BytesIO(body), np.float64, usecols=columns, max_rows=points, ndmin=2)
+        if len(rows) != points:
+            raise RefusedError("a PCD with as many points as its header says")
+        return rows
     if encoding == b"binary":
         kinds = [(str(n), field.dtype, (field.count,)) for n, field in enumerate(fields)]
         rows = np.frombuffer(body, np.dtype(kinds), points)
