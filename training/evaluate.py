@@ -29,7 +29,7 @@ from baselines.cli.task_options import (
     tasked,
 )
 from baselines.cli.worker_options import WorkerOptions
-from baselines.experiments.mission import Surroundings
+from baselines.experiments.mission import Surroundings, counted_time_s
 from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.rows import Record
 from baselines.experiments.statistics import Interval, median_interval, median_ratio_interval
@@ -209,7 +209,9 @@ def compare(
     ]
     records = by_cell(run_cells(cells, runs / "missions.jsonl", How(workers, "evaluation", quiet)))
     missions = {name: records[cell.id] for name, cell in zip((policy, *rivals), cells, strict=True)}
-    times = {name: np.array([record["t_mission_s"] for record in own]) for name, own in missions.items()}
+    times = {
+        name: np.array([counted_time_s(record, scenario) for record in own]) for name, own in missions.items()
+    }
     rows = [_row(name, missions[name], times[name], times[policy], name == policy) for name in missions]
     simple = [name for name in SIMPLE if name in rivals]
     return {

@@ -65,7 +65,7 @@ class Sampled(NamedTuple):
     @property
     def name(self) -> str:
         """What its file is called."""
-        return f"{self.split}-{self.recipe}-{self.number:04d}"
+        return f"{self.split}-{self.recipe}-{self.number:04d}-seed-{self.seed}-{self.snapshots}"
 
     @property
     def drawn_from(self) -> list[int]:

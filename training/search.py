@@ -37,7 +37,7 @@ import numpy as np
 from baselines.cli.arguments import make_folder, parse, print_json, run_command
 from baselines.cli.interruption import Interruption
 from baselines.cli.worker_options import WorkerOptions
-from baselines.experiments.mission import run_mission, scripted_env
+from baselines.experiments.mission import counted_time_s, run_mission, scripted_env
 from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.worker_pool import Failure, run_each
 from entropy_explore_env.command import INTERRUPTED
@@ -213,8 +213,7 @@ def play(lead: Lead) -> tuple[float, bool]:
     env = scripted_env(lead.scenario)
     run_mission(env, PlannedRate(lead.weights), lead.seed)
     figures = mission_figures(env.missions, 0)
-    finished = bool(figures["finished"])
-    return float(figures["t_mission_s"]) if finished else lead.scenario.ending.time_limit_s, finished
+    return counted_time_s(figures, lead.scenario), bool(figures["finished"])
 
 
 class Spreads:

@@ -23,7 +23,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 
 from baselines.cli.mission_outputs import MissionLog, Outputs
 from baselines.cli.task_options import TaskOptions, worlds_of
-from baselines.experiments.mission import Surroundings, run_mission, scripted
+from baselines.experiments.mission import Surroundings, counted_time_s, run_mission, scripted
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.envs.vector_env import EntropyExploreVectorEnv
 from entropy_explore_env.errors import SettingError
@@ -142,7 +142,7 @@ class Validator:
         ended = self.run(lambda observations: choose_actions(policy, observations, rng), stop)
         if ended is None:
             return None
-        times_s = np.array([each["t_mission_s"] for each in ended])
+        times_s = self._times_s(ended)
         gained_per_sent = [each["bits_gained_per_bit_sent"] for each in ended]
         defined = [each for each in gained_per_sent if each is not None]
         return Validation(
@@ -153,12 +153,16 @@ class Validator:
             self._planner_ratio(times_s) if isinstance(policy, CandidatePolicy) else None,
         )
 
+    def _times_s(self, ended: list[dict[str, float]]) -> np.ndarray:
+        """Return the time (E,) that each mission counts with."""
+        return np.array([counted_time_s(each, self._env.scenario) for each in ended])
+
     def _planner_ratio(self, times_s: np.ndarray) -> float:
         """Return the geometric mean of mission times (E,) over the planner's, which leads them once."""
         if self._planner_s is None:
             led = self.run(lambda observations: np.zeros(len(observations), np.int64))  # 0 = its own choice
             assert led is not None
-            self._planner_s = np.array([each["t_mission_s"] for each in led])
+            self._planner_s = self._times_s(led)
         return float(np.exp(np.log(times_s / self._planner_s).mean()))
 
     def run(

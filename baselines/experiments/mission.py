@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -158,6 +159,14 @@ def _idle_action(env: EntropyExploreEnv, agent: str) -> np.ndarray | np.int64:
     """Return an action for a robot that is busy: it is ignored."""
     space = env.action_space(agent)
     return np.zeros(space.shape, np.float32) if space.shape else np.int64(0)
+
+
+def counted_time_s(figures: Mapping[str, Any], scenario: Scenario) -> float:
+    """Return the time that a mission counts with: the time limit if it did not come to what it asks for."""
+    limit_s = scenario.ending.time_limit_s
+    if figures["finished"] or math.isinf(limit_s):
+        return float(figures["t_mission_s"])
+    return limit_s
 
 
 def mission_record(env: EntropyExploreEnv, strategy: str | Strategy, seed: int) -> Record:

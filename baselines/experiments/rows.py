@@ -99,7 +99,11 @@ def _row(line: str, place: str) -> Row:
         raise SettingError("table", place, allowed)
     try:
         origin = Origin(fields.pop("commit"), fields.pop("clean"), fields.pop("versions"))
-        return Row(**fields, origin=origin)
+        row = Row(**fields, origin=origin)
+        kinds = (row.cell, str), (row.seed, int), (row.settings, dict), (row.record, dict)
+        if not all(isinstance(value, kind) for value, kind in kinds):
+            raise TypeError
+        return row
     except (KeyError, TypeError):
         fields = "cell, seed, world, settings, commit, clean, versions, record"
         raise SettingError("table", place, f"a row with the fields {fields}") from None

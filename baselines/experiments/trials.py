@@ -187,6 +187,10 @@ def _progressing(results: Iterator[Item], done: int, total: int, how: How) -> It
             yield result
 
 
+FAILED = frozenset({"failed", "trace", "limit_s"})
+"""What is kept of a trial that failed."""
+
+
 def failed_record(failure: Failure, limit_s: float) -> Record:
     """Return what is kept of a trial that failed.
 
@@ -324,18 +328,31 @@ def _file_digest(file: Path) -> str:
 
 
 def _strategy_files(name: str) -> list[Path]:
-    """Return the files of a strategy that no commit of this repository says: weights, modules of others."""
+    """Return the files of a strategy that no commit of this repository says: weights, modules of others.
+
+    Raises:
+        SettingError: Its file or module is not there.
+    """
     if strategies.is_learned(name):
         return strategies.learned_policies().policy_files(name)
     if Path(name).is_file():
         return [Path(name)]  # weights of the planner
     source = strategies.strategy_module(name)
-    if isinstance(source, Path):
-        return [source]
-    if source.split(".")[0] in ("baselines", "entropy_explore_env", "training"):
+    if isinstance(source, str) and source.split(".")[0] in ("baselines", "entropy_explore_env", "training"):
         return []
-    spec = importlib.util.find_spec(source)
-    return [] if spec is None or spec.origin is None else [Path(spec.origin)]
+    file = source if isinstance(source, Path) else _file_of_module(source)
+    if file is None or not file.is_file():
+        raise SettingError("strategy", name, "a strategy whose file or module is there")
+    return [file]
+
+
+def _file_of_module(name: str) -> Path | None:
+    """Return the file of a module; None if there is none."""
+    try:
+        spec = importlib.util.find_spec(name)
+    except ModuleNotFoundError:
+        return None
+    return None if spec is None or spec.origin is None else Path(spec.origin)
 
 
 def trials_of(cells: Sequence[Cell]) -> list[CellTrial]:

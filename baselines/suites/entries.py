@@ -20,7 +20,7 @@ from baselines.experiments.mission import SuiteMission, replay_commands, suite_f
 from baselines.experiments.origin import this_origin
 from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.rows import Record, Row, read_table, write_table
-from baselines.experiments.trials import Cell, CellTrial, How, described_scenario, environment
+from baselines.experiments.trials import FAILED, Cell, CellTrial, How, described_scenario, environment
 from baselines.experiments.worker_pool import Failure, run_each
 from baselines.suites import find_suite
 from baselines.suites.public_worlds import fetch_worlds
@@ -171,14 +171,18 @@ def check_entry(folder: Path, workers: int | RayCluster) -> tuple[About, list[Ve
     """
     about, rows = read_about(folder), read_table(folder / ROWS)
     suite = find_suite(about.suite, about.quick, about.strategies).completed(by_seed(rows))
-    named = {(row.cell, row.seed): row for row in rows}
+    named, verdicts = {}, []
+    for row in rows:
+        if (row.cell, row.seed) in named:
+            verdicts.append(Verdict(row.cell, row.seed, "the mission has another row, too"))
+        named[row.cell, row.seed] = row
     fetch_worlds(cell.scenario for cell in suite.cells)
     claimed = [
         Claimed(trial.point, trial.seed, named.pop((trial.cell, trial.seed), None), file)
         for trial in sorted(suite.trials, key=lambda trial: (trial.cell, trial.seed))
         for file in [record_file(folder, trial.cell, trial.seed)]
     ]
-    verdicts = [Verdict(cell, seed, "no mission of the suite has this row") for cell, seed in named]
+    verdicts += [Verdict(cell, seed, "no mission of the suite has this row") for cell, seed in named]
     for each, fault in run_each(_fault_of, claimed, workers):
         said = fault.reason if isinstance(fault, Failure) else fault
         verdicts.append(Verdict(each.cell.id, each.seed, said))
@@ -196,7 +200,8 @@ def _fault_of(claimed: Claimed) -> str:
     if row.settings.get("scenario") != json.loads(json.dumps(described_scenario(claimed.cell))):
         return "the row has other settings than the suite"
     if "failed" in row.record:  # counts as the worst that a mission can come to
-        return ""
+        figures = sorted(row.record.keys() - FAILED)
+        return f"a failed mission has no {figures[0]}" if figures else ""
     try:
         return _difference(claimed, row.record)
     except EntropyExploreError as error:

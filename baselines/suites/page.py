@@ -20,7 +20,7 @@ from baselines.suites.faults import CONDITIONS, LOST_ISOLATED, NOTHING_FAILS, Ti
 from baselines.suites.figures import fault_figure, task_figure
 from baselines.suites.prediction import bounds_table
 from baselines.suites.results import Results, Row, failed_rows, overall_rows, results_of, task_rows
-from baselines.suites.suite import REFERENCE, Measure, Task
+from baselines.suites.suite import Measure, Task
 from entropy_explore_env.errors import counted
 from entropy_explore_env.writing import write_atomically
 
@@ -147,17 +147,17 @@ def entries_table(folder: Path) -> str:
     for entry in sorted(each.parent for each in folder.glob(f"*/{entries.ABOUT}")):
         about, check = entries.read_about(entry), entries.read_check(entry)
         archived = read_table(archive_of(folder.parents[1], about.suite))
-        kept = [row for row in archived if row.settings.get("strategy") == REFERENCE]
-        kept += read_table(entry / entries.ROWS)
-        results, _ = results_of(find_suite(about.suite, about.quick, about.strategies), kept)
+        suite = find_suite(about.suite, about.quick, about.strategies)
+        kept = [row for row in archived if row.settings.get("strategy") == suite.reference]
+        results, _ = results_of(suite, [*kept, *read_table(entry / entries.ROWS)])
         own = [row for row in overall_rows(results) if row["strategy"] in about.strategies]
         checked = "no"
         if check is not None:
             checked = f"{check.held} of {check.rows} rows" if check.held < check.rows else "yes"
-        suite = f"{about.suite}, quick" if about.quick else about.suite
+        form = f"{about.suite}, quick" if about.quick else about.suite
         for name, *cells in _overall(results, own)[1]:
             link = f"[`{name}`](scoreboard/entries/{entry.name})"
-            rows.append([link, about.author, suite, *cells[: len(head) - 4], checked])
+            rows.append([link, about.author, form, *cells[: len(head) - 4], checked])
     return markdown_table(head, rows) if rows else ""
 
 

@@ -51,6 +51,8 @@ class Measure(NamedTuple):
 
     def value(self, record: Record) -> float | None:
         """Return the measure of a mission; None if the mission failed or never came that far."""
+        if "failed" in record:
+            return None
         if self.share is None:
             if not record.get("finished", False):
                 return None

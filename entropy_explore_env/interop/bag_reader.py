@@ -135,8 +135,8 @@ class BagReader:
 
         Args:
             path: Folder of a ROS 2 bag, an .mcap or .db3 in it, or a .bag of ROS 1.
-            topic: Topic of the map or scans; None = `/map`, or else all topics of maps, or of scans where there
-                are no maps.
+            topic: Topic of the map or scans; None = `/map`, or all topics of maps, or those of scans where
+                there are no maps.
             map_frame: The frame in which poses are wanted.
             robots: Their frames; None given = those of Odometry, or base_footprint or base_link.
             posed: Whether maps are wanted only with the pose of a robot.

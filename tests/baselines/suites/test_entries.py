@@ -97,6 +97,38 @@ def test_missing_rows_rows_too_many_and_other_settings_are_found(entry):
     ]
 
 
+def test_a_second_row_of_a_mission_and_figures_of_failed_ones_are_found(entry):
+    def failed(row):
+        return replace(row, record={"failed": "ran past 600 s", "trace": "", "limit_s": 600.0})
+
+    def forged(row):
+        return replace(failed(row), record={**failed(row).record, "finished": True, "t_mission_s": 1.0})
+
+    change_row(entry, 0, lambda row: [replace(row, settings={**row.settings, "strategy_files": []}), row])
+    change_row(entry, 1, lambda row: [failed(row)])
+    change_row(entry, 2, lambda row: [forged(row)])
+    assert faults(entry) == [
+        (CELL, 0, "the mission has another row, too"),
+        (CELL, 2, "a failed mission has no finished"),
+    ]
+    change_row(entry, 1, lambda row: [replace(row, seed="1")])
+    with pytest.raises(SettingError, match="a row with the fields"):
+        check_entry(entry, 1)
+
+
+@pytest.mark.parametrize("name", ["theirs.py:Mine", "their_package.module:Mine", "their_module:Mine"])
+def test_an_entry_whose_strategy_is_not_here_is_shown(entry, name):
+    about = json.loads((entry / "entry.json").read_text())
+    (entry / "entry.json").write_text(json.dumps({**about, "strategies": [name]}))
+    theirs = {"strategy": name, "strategy_files": [["theirs.py", "0123456789abcdef"]]}
+    rows = [
+        replace(row, cell=f"box/{name}", settings={**row.settings, **theirs})
+        for row in read_table(entry / ROWS)
+    ]
+    write_table(entry / ROWS, rows)
+    assert "| [`Mine`](scoreboard/entries/mine) | A. Name | tiny | 1 | 3 |" in entries_table(entry.parent)
+
+
 def test_changed_actions_records_of_other_worlds_and_broken_ones_are_found(entry):
     first, second, third = (record_file(entry, CELL, seed) for seed in range(3))
     record = load_record(first)
