@@ -21,7 +21,7 @@ from baselines.strategies import make_strategy
 from entropy_explore_env.errors import RecordError, SettingError
 from entropy_explore_env.explorer.explorer import Explorer
 from entropy_explore_env.interop.bag_reader import BagReader, MapHeard, ScanHeard
-from entropy_explore_env.settings.validation import check_whole
+from entropy_explore_env.settings.validation import check_whole, checked_path
 
 _SCAN_VOXEL_M = 0.1
 SUFFIXES = (".mcap", ".db3", ".bag")
@@ -58,7 +58,7 @@ def is_bag(words: Sequence[str]) -> bool:
     """Return whether the first word of a command line names a bag."""
     if not words or words[0].startswith("-"):
         return False
-    path = Path(words[0]).expanduser()
+    path = checked_path("bag", words[0])
     return path.is_dir() or path.suffix in SUFFIXES
 
 

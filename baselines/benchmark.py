@@ -18,7 +18,7 @@ import dataclasses
 import math
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar
@@ -60,6 +60,9 @@ _WHERE = (
 )
 _NOT_TOLD = (*_WHERE, "--rerun", "--since")
 """Options that a page does not tell."""
+_OF_CHECK = ("check", "json", "jobs", "cluster")
+_OF_PAGE = ("out", "runs", "archive", "cite", "tables")
+"""Options of what a run writes that is no entry."""
 
 
 @dataclass
@@ -120,9 +123,12 @@ def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
     if args.check is not None:
+        _refuse_beside("check", words, lambda name: name not in _OF_CHECK)
         return _check(args.check, args)
     if args.entry is not None and not (args.suite and args.strategies and args.author.strip()):
         raise SettingError("entry", str(args.entry), "--suite, --strategies and --author beside it")
+    if args.entry is not None:
+        _refuse_beside("entry", words, lambda name: name in _OF_PAGE)
     suite, refused = _suite(args, words)
     stop_after_s = math.inf if args.stop_after_s is None else args.stop_after_s
     title = "strategies" if args.suite is None else f"suite {suite.name}"
@@ -172,8 +178,20 @@ def _enter(folder: Path, suite: Suite, how: How, args: Args) -> int:
 
     make_folder("entry", folder)
     whole = write_entry(folder, suite, args.quick, args.author, how)
-    print(f"written: {folder}" if whole else f"stopped; the same command goes on with what is in {folder}")
+    if args.json:
+        print_json({"entry": str(folder), "whole": whole})
+    elif whole:
+        print(f"written: {folder}")
+    else:
+        print(f"stopped; the same command goes on with what is in {folder}")
     return 0
+
+
+def _refuse_beside(option: str, words: Sequence[str], refused: Callable[[str], bool]) -> None:
+    """Raise a SettingError that names an option which does not go with another one."""
+    for name, value in given_values(Args, words).items():
+        if name != option and refused(name):
+            raise SettingError(name, value, f"no value beside --{option}")
 
 
 def _check(folder: Path, args: Args) -> int:
@@ -218,6 +236,9 @@ def _suite(args: Args, words: Sequence[str]) -> tuple[Suite, list[str]]:
             raise SettingError(name, value, "no value beside --suite, which pins it")
         chosen = chosen_strategies(args.strategies, suite, alone=args.entry is not None)
         return dataclasses.replace(suite, strategies=chosen), []
+    if args.world_scenario is not None and (args.scenarios is not None or not args.task.world):
+        allowed = "no value without --world, or with --scenarios"
+        raise SettingError("world_scenario", args.world_scenario, allowed)
     if args.world_scenario is not None and args.world_scenario not in SCENARIOS:
         raise SettingError("world_scenario", args.world_scenario, one_of(args.world_scenario, SCENARIOS))
     strategies = chosen_strategies(args.strategies)

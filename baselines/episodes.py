@@ -76,7 +76,7 @@ def main(words: Sequence[str]) -> int:
     scenario, surroundings = tasked(task.scenario, args.task, args.robots)
     make_folder("out", args.out)
     from baselines.offline.recorded_env import observed_scenario
-    from baselines.offline.shards import Shard
+    from baselines.offline.shards import Shard, refuse_others
 
     recorded = observed_scenario(scenario, args.observation)
     shards = [
@@ -85,6 +85,7 @@ def main(words: Sequence[str]) -> int:
         for missions in [min(args.missions_per_file, args.missions - done)]
     ]
     table = args.out / ROWS
+    refuse_others(shards, read_table(table))
     kept = {row.key: row.record for row in read_table(table)}
     lost = [shard for shard in shards if shard.key in kept and not shard.is_whole(kept[shard.key])]
     run_trials(lost, table, dataclasses.replace(how, rerun=True, since=None))

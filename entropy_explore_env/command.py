@@ -64,6 +64,14 @@ def home_path(word: str) -> Path:
         raise ValueError(f"{word}: {error}") from None
 
 
+def is_file(word: str) -> bool:
+    """Return whether a word is the path of a file, as one types it."""
+    try:
+        return home_path(word).is_file()
+    except (OSError, ValueError):
+        return False
+
+
 class UsageError(EntropyExploreError):
     """The arguments of a command line do not fit its options."""
 

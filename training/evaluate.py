@@ -26,6 +26,7 @@ from baselines.cli.task_options import (
     base_task,
     is_whole_scenario,
     parsed_for,
+    settings_in,
     tasked,
 )
 from baselines.cli.worker_options import WorkerOptions
@@ -92,7 +93,8 @@ def main(words: Sequence[str]) -> int:
     base = base_task(evaluation_scenario(trained, args.scenario, args.robots), args.task.settings)
     if args.scenario is not None and is_whole_scenario(args.task.settings):
         raise SettingError("scenario", args.scenario, "no value: --settings holds a scenario of its own")
-    base = base._replace(scenario=with_settings(base.scenario, {"split": "test"}))
+    if args.task.settings is None or "split" not in settings_in(args.task.settings):
+        base = base._replace(scenario=with_settings(base.scenario, {"split": "test"}))
     args = parsed_for(base, args, words)
     elsewhere = args.scenario or args.task.settings or args.task.world
     made = {scenario.world for scenario in SCENARIOS.values()}  # the recipes

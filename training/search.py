@@ -34,7 +34,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from baselines.cli.arguments import make_folder, parse, print_json, run_command
+from baselines.cli.arguments import given_values, make_folder, parse, print_json, run_command
 from baselines.cli.interruption import Interruption
 from baselines.cli.worker_options import WorkerOptions
 from baselines.experiments.mission import counted_time_s, run_mission, scripted_env
@@ -113,6 +113,10 @@ def main(words: Sequence[str]) -> int:
     check(args)
     scenarios = tuple(learned_scenario(task) for task in args.tasks)
     begun = PlannerWeights(candidates=args.candidates) if args.begin is None else read_weights(args.begin)
+    if "candidates" in given_values(Args, words) and args.candidates != begun.candidates:
+        raise SettingError(
+            "candidates", args.candidates, f"{begun.candidates}, as the weights in --begin have"
+        )
     workers = args.workers
     make_folder("out", args.out)
     origin = {name: getattr(args, name) for name in ("rounds", "pairs", "sigma", "step", "seed")}

@@ -20,14 +20,14 @@ from typing import Any, TypeVar
 from baselines.cli.help import help_text
 from baselines.cli.options import Option, options_of
 from entropy_explore_env import command
-from entropy_explore_env.command import LineParser, UsageError
+from entropy_explore_env.command import LineParser, UsageError, is_file
 from entropy_explore_env.errors import SettingError, did_you_mean
 from entropy_explore_env.worlds.given import distinct_paths
 
 Arguments = TypeVar("Arguments")
 
 _HELP = ("-h", "--help")
-_NEGATIVE = re.compile(r"-[\d.]+e[+-]?\d+", re.IGNORECASE)
+_NEGATIVE = re.compile(r"-(\d+\.?\d*|\.\d+)e[+-]?\d+", re.IGNORECASE)
 """A negative number with an exponent, which argparse takes for a flag."""
 
 
@@ -209,6 +209,6 @@ def told_command(command: str, words: Sequence[str], leave_out: Sequence[str]) -
             left_out = word.split("=")[0].replace("_", "-") in leave_out
         if not left_out:
             told.append(word)
-    files = [word for word in told if Path(word).expanduser().is_file()]
+    files = [word for word in told if not word.startswith("-") and is_file(word)]
     names = dict(zip(files, distinct_paths([Path(file) for file in files]), strict=True))
     return " ".join([command, shlex.join(names.get(word, word) for word in told)]).strip()

@@ -11,7 +11,6 @@ import dataclasses
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, NamedTuple, Protocol, TypeVar
 
@@ -19,7 +18,7 @@ from baselines.cli.arguments import given_values, overlaid
 from baselines.cli.options import Mark
 from baselines.cli.world_options import Reading
 from baselines.experiments.mission import Surroundings
-from entropy_explore_env.command import allow_read_memory
+from entropy_explore_env.command import allow_read_memory, home_path, is_file
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.changes import with_settings
@@ -124,7 +123,7 @@ def base_task(
     """
     if settings is None:
         return BaseTask(with_settings(find_scenario(name), own), None)
-    given = _settings_in(settings)
+    given = settings_in(settings)
     if not is_whole_scenario(settings):
         named = with_settings(find_scenario(name), own)
         given = _merged(settings_of(named) | {"decision_period_s": None}, given)
@@ -138,16 +137,16 @@ def is_whole_scenario(settings: str | None) -> bool:
     Raises:
         SettingError: It holds no settings of a scenario.
     """
-    given = {} if settings is None else _settings_in(settings)
+    given = {} if settings is None else settings_in(settings)
     return all(name in given for name in _WHOLE)
 
 
-def _settings_in(file: str) -> Mapping[str, Any]:
+def settings_in(file: str) -> Mapping[str, Any]:
     """Return the object of settings in a file, or in a text that is one."""
     allowed = "a file with a scenario's settings as JSON"
     try:
         inline = file.lstrip().startswith("{")
-        given = json.loads(file if inline else Path(file).expanduser().read_text("utf-8"))
+        given = json.loads(file if inline else home_path(file).read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         reason = getattr(error, "strerror", None) or error
         raise SettingError("settings", file, f"{allowed} ({reason})") from None
@@ -298,8 +297,8 @@ def given_json(option: str, given: str, allowed: str) -> Any:  # noqa: ANN401 - 
     text = given
     if not given.lstrip().startswith("["):
         try:
-            text = Path(given).expanduser().read_text("utf-8")
-        except (OSError, UnicodeDecodeError):
+            text = home_path(given).read_text("utf-8")
+        except (OSError, ValueError):
             raise SettingError(option, given, allowed) from None
     try:
         return json.loads(text)
@@ -330,11 +329,10 @@ def settled(options: TaskOptions) -> TaskOptions:
         if (given := getattr(options, name)) is not None
     }
     if options.settings is not None:
-        texts["settings"] = json.dumps(_settings_in(options.settings))
+        texts["settings"] = json.dumps(settings_in(options.settings))
     return dataclasses.replace(options, world=absolute_files(options.world), **texts)
 
 
 def absolute_files(files: Iterable[str]) -> tuple[str, ...]:
     """Return the world files as absolute paths; a name that is no file stays."""
-    paths = ((file, Path(file).expanduser()) for file in files)
-    return tuple(str(path.absolute()) if path.is_file() else file for file, path in paths)
+    return tuple(str(home_path(file).absolute()) if is_file(file) else file for file in files)

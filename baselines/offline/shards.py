@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,12 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from baselines.experiments import rows as kept_rows
 from baselines.experiments.mission import Surroundings
 from baselines.experiments.rows import Record, trial_key
 from baselines.experiments.trials import Cell, CellTrial, described
 from baselines.offline.recorded_env import Row, record_mission, recorded_env
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.action import action_space
 from entropy_explore_env.missions.observation.layout import ObservationLayout
 from entropy_explore_env.settings.json import settings_of
@@ -61,6 +64,11 @@ def schema_of(scenario: Scenario, strategy: str) -> pa.Schema:
     return pa.schema(fields, metadata={METADATA: json.dumps(described, allow_nan=False).encode()})
 
 
+def file_of(folder: Path, seed: int) -> Path:
+    """Return the file of missions from a seed on."""
+    return folder / f"episodes-{seed:09}.parquet"
+
+
 @dataclass(frozen=True)
 class Shard:
     """The missions of one file, as a trial of an experiment.
@@ -84,7 +92,7 @@ class Shard:
     @property
     def path(self) -> Path:
         """Where it is written."""
-        return Path(self.out) / f"episodes-{self.seed:09}.parquet"
+        return file_of(Path(self.out), self.seed)
 
     @property
     def world(self) -> str:
@@ -135,3 +143,25 @@ class Shard:
         finally:
             unfinished.unlink(missing_ok=True)
         return {**counts, "bytes": self.path.stat().st_size}
+
+
+def refuse_others(shards: Sequence[Shard], rows: Iterable[kept_rows.Row]) -> None:
+    """Refuse a folder that has files of other missions, or of the same ones in other files.
+
+    Args:
+        shards: All that a command writes.
+        rows: Of the folder's table.
+
+    Raises:
+        SettingError: It has such a file.
+    """
+    ours, first, last = {shard.path for shard in shards}, shards[0].seed, shards[-1]
+    asked = {**shards[0].settings, "missions": None}
+    for row in rows:
+        file = file_of(Path(shards[0].out), row.seed)
+        if file in ours or not file.is_file():
+            continue
+        apart = row.seed >= last.seed + last.missions or row.seed + row.settings["missions"] <= first
+        if not apart or {**row.settings, "missions": None} != asked:
+            allowed = f"a folder without {file.name}, which holds these missions in another form, or others"
+            raise SettingError("out", shards[0].out, allowed)

@@ -25,6 +25,7 @@ from baselines.suites.suite import Place, Task, team_name
 from entropy_explore_env.errors import EntropyExploreError, SettingError, WorldError, one_of
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import SCENARIOS, find_scenario
+from entropy_explore_env.settings.validation import checked_path
 from entropy_explore_env.worlds.formats import FORMATS
 from entropy_explore_env.worlds.given import GIVEN, distinct_names
 from entropy_explore_env.worlds.public.table import PUBLIC
@@ -104,7 +105,7 @@ def world_tasks(
         SettingError: An option is not allowed, or a folder holds no world file.
         WorldError: No file can be used.
     """
-    files = [file for path in given["world"] for file in world_files(Path(path).expanduser())]
+    files = [file for path in given["world"] for file in world_files(checked_path("world", path))]
     tasks: list[Task] = []
     refused: list[EntropyExploreError] = []
     for name, file in zip(distinct_names(files), files, strict=True):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import runpy
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from baselines.cli.arguments import run_command
 from baselines.experiments.mission import mission_record, scripted_env
 from baselines.strategies import make_strategy
 from baselines.strategies.protocol import choose_all
+from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.settings.scenarios import BOX
 
 pq = pytest.importorskip("pyarrow.parquet", reason="pip install 'entropy_explore_env[episodes]'")
@@ -109,6 +111,19 @@ def test_the_bytes_are_the_same_and_what_is_missing_is_written_again(written, tm
     kept = files[2].stat().st_mtime_ns
     assert run_command(main, command) == 0
     assert content(tmp_path) == content(written) and files[2].stat().st_mtime_ns == kept
+
+
+def test_a_folder_with_other_missions_or_the_same_in_other_files_is_refused(written, tmp_path, capsys):
+    shutil.copytree(written, tmp_path, dirs_exist_ok=True)
+    before = content(tmp_path)
+    for change in (["--missions-per-file", "3"], ["--missions", "2", "--strategy", "random"]):
+        assert run_command(main, [*WORDS, *change, "--out", str(tmp_path)]) == BAD_INPUT
+        said = capsys.readouterr().err
+        assert said.startswith("error: out = ") and "a folder without episodes-000000002.parquet" in said
+    assert content(tmp_path) == before
+    more = [*WORDS, "--first-seed", "5", "--missions", "1", "--out", str(tmp_path)]
+    assert run_command(main, more) == 0
+    assert content(tmp_path).keys() - before.keys() == {"episodes-000000005.parquet"}
 
 
 def test_memory_holds_one_mission(written):

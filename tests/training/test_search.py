@@ -156,7 +156,9 @@ def test_a_search_with_other_options_is_refused_by_name(more, named, whole, caps
     assert named in capsys.readouterr().err and (whole / "pairs.jsonl").read_bytes() == before
 
 
-def test_a_search_begins_with_other_weights(whole, tmp_path):
+def test_a_search_begins_with_other_weights(whole, tmp_path, capsys):
     assert run(tmp_path, f"--begin {whole / 'weights.json'} --rounds 1") == 0
+    assert run(tmp_path, f"--begin {whole / 'weights.json'} --rounds 1 --candidates 9") == BAD_INPUT
+    assert "candidates = 9: expected 6, as the weights" in capsys.readouterr().err
     begun = json.loads((tmp_path / "pairs.jsonl").read_text().splitlines()[0])["begin"]
     assert begun["weights"] == dict(read_weights(whole / "weights.json").weights)

@@ -135,6 +135,7 @@ def test_paths_begin_at_home(monkeypatch, tmp_path):
         ("--body.turns lef", "expected one of left, right; did you mean left?, or a number"),
         ("--body.places-m 1 2 3", "--body.places-m: expected 2 numbers each"),
         ("--num 3", "did you mean --number?"),
+        ("--number -1.5.2e3", "--number"),
     ],
 )
 def test_words_that_do_not_fit_are_named_in_one_line_and_print_nothing(words, said, capsys):

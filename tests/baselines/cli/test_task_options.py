@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from baselines.cli.arguments import given_values, parse, told_command
+from baselines import benchmark, run
+from baselines.cli.arguments import given_values, parse, run_command, told_command
 from baselines.cli.options import options_of
 from baselines.cli.task_options import TaskOptions, base_task, options_for, settled, tasked
 from baselines.experiments.mission import Surroundings, run_mission, scripted_env
 from baselines.strategies import make_strategy
+from entropy_explore_env.command import BAD_INPUT
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.json import settings_of
@@ -193,3 +195,11 @@ def test_the_help_of_a_command_fits_a_screen_and_names_what_there_is(command, wo
     assert len(said.splitlines()) <= 70 and "\n\n\n" not in said
     names = {option.name for option in options_of(module.Args, module.Args())}
     assert set(getattr(module.Args, "usual", ())) <= names
+
+
+@pytest.mark.parametrize("option", ["--starts", "--settings", "--extra-kinds", "--world"])
+@pytest.mark.parametrize("command", [run.main, benchmark.main])
+def test_a_file_below_a_home_folder_that_is_not_there_is_an_error_in_one_line(option, command, capsys):
+    assert run_command(command, [option, "~nobody-of-this-name/x.json"]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert "~nobody-of-this-name/x.json" in said and len(said.splitlines()) == 1

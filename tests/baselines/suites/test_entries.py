@@ -155,7 +155,10 @@ def test_a_record_that_is_cut_short_does_not_end_its_mission(entry):
     [
         ((*WORDS[:4], "--entry", "mine"), "entry = .*--author"),
         (("--strategies", "gradient", "--author", "A", "--entry", "mine"), "entry = .*--suite"),
+        ((*WORDS, "--entry", "mine", "--cite", "there"), "cite = .*no value beside --entry"),
         (("--check", "nowhere"), "entry = .*nowhere.*folder of an entry"),
+        (("--check", "nowhere", "--suite", "tiny"), "suite = 'tiny': expected no value beside --check"),
+        (("--world-scenario", "office", "--scenarios", "room"), "world_scenario = 'office'.*without --world"),
     ],
 )
 def test_what_is_no_entry_is_refused_by_name(words, said, tmp_path, monkeypatch):
