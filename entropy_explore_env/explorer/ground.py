@@ -84,7 +84,7 @@ class Ground:
         margin = np.full(3, times * int(min(np.ceil(reach), _MARGIN)))
         low, high = box[0] - margin, box[1] + margin
         if self._stays_level(layers):
-            low[2], high[2] = 0, layers
+            low[2], high[2] = min(0, int(box[0][2])), layers
         return low, high
 
     def room_for(self, patch: Patch) -> np.ndarray:

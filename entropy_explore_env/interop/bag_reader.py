@@ -292,7 +292,8 @@ def _map_of(message: Any, kind: str) -> tuple[np.ndarray, np.ndarray, float]:  #
         grid = grid_of_message(message)
         x, y, yaw = grid.origin
         return grid.grid, np.array([x, y, grid.bottom_m, yaw, 0.0]), grid.resolution_m
-    labels, low = voxels_of_tree(np.asarray(message.data).tobytes(), bool(message.binary))
+    data = np.asarray(message.data).tobytes()
+    labels, low = voxels_of_tree(data, bool(message.binary), str(message.id))
     edge_m = float(message.resolution)
     return percent_of(labels), np.array([*(low * edge_m), 0.0, 0.0]), edge_m
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.robots.rotations import gaze_of, quaternion_matrix
-from entropy_explore_env.worlds.files.octomap_tree import leaves_of, own_labels
+from entropy_explore_env.worlds.files.octomap_tree import leaves_of, own_labels, without_colours
 from entropy_explore_env.worlds.files.voxels import FREE, SOLID, RefusedError
 
 ARROW_M = (0.6, 0.12, 0.12)
@@ -63,14 +63,20 @@ def lies_level(rotation: np.ndarray) -> bool:
     return bool(rotation[2, 2] >= _LEVEL)
 
 
-def voxels_of_tree(data: bytes, binary: bool) -> tuple[np.ndarray, np.ndarray]:
+def voxels_of_tree(data: bytes, binary: bool, kind: str = "OcTree") -> tuple[np.ndarray, np.ndarray]:
     """Return the labels (X, Y, Z) int8 of an Octomap's box, and its lower corner (3,) in voxels.
 
+    Args:
+        data: The nodes.
+        binary: Whether each of them is two bits.
+        kind: The tree's id.
+
     Raises:
-        SettingError: The bytes end too early, the tree is too deep, or its box has too many voxels.
+        SettingError: Trees of this kind are not read, the bytes end too early, the tree is too deep, or its
+            box has too many voxels.
     """
     try:
-        leaves, _ = leaves_of(data, binary)
+        leaves, _ = leaves_of(data if binary else without_colours(data, kind.encode()), binary)
     except RefusedError as error:
         raise SettingError("octomap.data", f"{len(data)} bytes", str(error)) from None
     low, high = leaves.box

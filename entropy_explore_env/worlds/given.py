@@ -172,16 +172,17 @@ def _widened(world: World, grid: Grid, with_ceiling: bool) -> World:
     if world.grid == grid and (world.ceiling is not None or not with_ceiling):
         return world
     x, y, z = world.grid.shape
-    solid, ceiling, unreadable = np.ones(grid.shape, bool), None, None
+    solid, ceiling, masks = np.ones(grid.shape, bool), None, {}
     solid[:x, :y, :z] = world.occupied
-    if world.unreadable is not None:
-        unreadable = np.zeros(grid.shape, bool)
-        unreadable[:x, :y, :z] = world.unreadable
+    for name, mask in (("unknown", world.unknown), ("unreadable", world.unreadable)):
+        if mask is not None:
+            masks[name] = np.zeros(grid.shape, bool)
+            masks[name][:x, :y, :z] = mask
     if with_ceiling:
         ceiling = np.full(grid.shape[:2], grid.shape[2], np.int32)
         if world.ceiling is not None:
             ceiling[:x, :y] = world.ceiling
-    return World(grid, solid, world.name, ceiling, unreadable=unreadable)
+    return World(grid, solid, world.name, ceiling, **masks)
 
 
 def distinct_names(paths: Sequence[Path]) -> list[str]:

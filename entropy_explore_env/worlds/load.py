@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 import warnings
 from functools import lru_cache
 from pathlib import Path
@@ -274,7 +275,7 @@ def world_from_file(path: Path | str, voxel_size_m: float, **options: Any) -> Wo
         raise SettingError("Scenario.world", str(path), allowed + did_you_mean(str(path), (*RECIPES, *NAMES)))
     options["voxel_size_m"] = voxel_size_m
     check_options(options)
-    path = path if str(path) in NAMES else path.absolute()
+    path = path if str(path) in NAMES else Path(os.path.normpath(path.absolute()))  # links are kept
     return _cached_world(path, _file_version(path), tuple(sorted(options.items())))
 
 

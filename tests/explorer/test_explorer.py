@@ -340,6 +340,14 @@ def test_without_a_clock_time_passes_as_the_robot_drives_however_often_it_is_ask
         explorer.goal(START, time_s=looked_s + 0.3 * goal.seconds)
 
 
+def test_a_later_map_may_begin_below_the_first_one():
+    explorer = Explorer(voxel_size_m=0.1)
+    explorer.set_map(np.zeros((30, 30, 8), np.int8), (0.0, 0.0, 0.0))
+    explorer.set_map(np.zeros((30, 30, 12), np.int8), (0.0, 0.0, 0.0), bottom_m=-0.4)
+    assert explorer.map.known.sum() == 30 * 30 * 12 and explorer.map.grid.origin_m[2] == pytest.approx(-0.4)
+    assert explorer.goal([1.5, 1.5, 0.0, 0.0, 0.0]) is not None
+
+
 def test_beams_beyond_the_range_say_that_they_are_free_up_to_it():
     near, far = (Explorer("office") for _ in range(2))
     pose = np.array([12.0, 9.0, 0.05, 0.0, 0.0])

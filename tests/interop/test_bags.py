@@ -207,6 +207,11 @@ def test_trees_are_read_without_octomap():
         tree = octomap_of(belief, full)
         labels, low = voxels_of_tree(tree[tree.index(b"\ndata\n") + 6 :], binary=not full)
         assert np.array_equal(labels, drawn) and low.tolist() == [-4, 2, 6]
+    nodes = np.frombuffer(tree[tree.index(b"\ndata\n") + 6 :], np.uint8).reshape(-1, 5)
+    coloured = np.insert(nodes, [4, 4, 4], 200, axis=1).tobytes()
+    assert np.array_equal(voxels_of_tree(coloured, binary=False, kind="ColorOcTree")[0], drawn)
+    with pytest.raises(SettingError, match=r"octomap.data = .*ColorOcTree"):
+        voxels_of_tree(coloured, binary=False, kind="MyTree")
     assert octomap.OcTree(0.5).size() == 0
     for broken in (b"", east[:-2], b"\x00\x00", b"\xff" * 4000):
         with pytest.raises(SettingError, match=r"octomap.data = "):

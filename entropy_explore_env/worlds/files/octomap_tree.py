@@ -33,6 +33,7 @@ from entropy_explore_env.worlds.files.voxels import (
 )
 
 NEEDS = ()
+_KNOWN = "an OctoMap whose id is OcTree, OcTreeStamped or ColorOcTree"
 _RECORDS = {b"OcTree": 5, b"1": 5, b"OcTreeStamped": 5, b"ColorOcTree": 8}
 """Id of a tree, "1" in old files → bytes of a node in an .ot: its occupancy, a colour, its children."""
 _DATA_LINE = re.compile(rb"\r?\ndata[ \t]*\r?\n")
@@ -99,19 +100,35 @@ def _head_and_body(data: bytes, binary: bool) -> tuple[int, float, bytes]:
     head, body = data[: found.start()], data[found.end() :]
     rows = (line.split() for line in head.splitlines() if not line.startswith(b"#"))
     about = {row[0]: row[1] for row in rows if len(row) > 1}
-    record = _RECORDS.get(about.get(b"id", b""))
-    if record is None:
-        raise RefusedError("an OctoMap whose id is OcTree, OcTreeStamped or ColorOcTree")
+    kind = about.get(b"id", b"")
+    if kind not in _RECORDS:
+        raise RefusedError(_KNOWN)
     try:
         size, edge = int(about.get(b"size", b"0")), float(about.get(b"res", b"0"))
     except ValueError:
         raise RefusedError("an OctoMap whose size and res are numbers") from None
     if not 0.0 < edge < math.inf:
         raise RefusedError(_SIZED)
-    if record > _RECORDS[b"OcTree"] and not binary:
-        nodes = np.frombuffer(body, np.uint8, len(body) // record * record).reshape(-1, record)
-        body = nodes[:, [0, 1, 2, 3, record - 1]].tobytes()
-    return size, edge, body
+    return size, edge, body if binary else without_colours(body, kind)
+
+
+def without_colours(body: bytes, kind: bytes) -> bytes:
+    """Return the nodes of a tree in the full form as those of an OcTree.
+
+    Args:
+        body: The nodes.
+        kind: The tree's id.
+
+    Raises:
+        RefusedError: Trees of this kind are not read.
+    """
+    if kind not in _RECORDS:
+        raise RefusedError(_KNOWN)
+    record = _RECORDS[kind]
+    if record == _RECORDS[b"OcTree"]:
+        return body
+    nodes = np.frombuffer(body, np.uint8, len(body) // record * record).reshape(-1, record)
+    return nodes[:, [0, 1, 2, 3, record - 1]].tobytes()
 
 
 def leaves_of(body: bytes, binary: bool) -> tuple[Leaves, int]:
