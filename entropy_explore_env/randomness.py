@@ -15,6 +15,8 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.validation import is_whole
 
+_SEEDS = 10**4000
+
 
 class Stream(enum.IntEnum):
     """The purpose of a random draw; drawing from one stream does not change the others."""
@@ -50,12 +52,14 @@ def check_seed(seed: object) -> int:
     """Return the seed as an int; if it is None, a new one from the operating system.
 
     Raises:
-        SettingError: It is neither None nor a whole number ≥ 0.
+        SettingError: It is neither None nor a whole number ≥ 0, or it has more than 4000 digits.
     """
     if seed is None:
         return int(np.random.SeedSequence().generate_state(1, np.uint64)[0])
     if not is_whole(seed, 0):
         raise SettingError("seed", seed, "a whole number ≥ 0, or None")
+    if int(seed) >= _SEEDS:
+        raise SettingError("seed", "a longer number", "at most 4000 digits, which records hold")
     return int(seed)
 
 

@@ -33,9 +33,11 @@ from baselines.cli.task_options import (
     settled,
     tasked,
 )
+from baselines.experiments.tables import csv_table
 from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.settings.validation import check_whole
+from entropy_explore_env.writing import write_atomically
 from training import extra  # noqa: F401 - before what is not there without it
 from training.checkpoints import NotFiniteError, SilentRunnersError
 from training.rllib_run import (
@@ -233,6 +235,8 @@ def iterate(
     """
     assert args.out is not None
     begun, steps, silent, started = iteration, 0, 0, time.perf_counter()
+    if begun:
+        validation.resume(rewind(args.out / "progress.csv", begun))
     while steps < args.total_steps:
         result = algorithm.train()
         if decisions_of(result) == steps:
@@ -241,13 +245,13 @@ def iterate(
                 raise SilentRunnersError(args.runners, MOST_SILENT * SAMPLE_TIMEOUT_S, steps)
             print(f"{steps:>11,} decisions  no runner has reported: once more", file=sys.stderr, flush=True)
             if interruption.asked:
+                if iteration > begun:
+                    save_checkpoint(algorithm, args.out, iteration)
                 return False
             continue
         iteration, silent = iteration + 1, 0
         row = progress_row(result, iteration, args.robots)
         steps = int(row["decisions"])
-        if begun and iteration == begun + 1:
-            validation.resume(steps - 1)
         row["seconds"] = round(time.perf_counter() - started, 1)
         append_row(args.out / "progress.csv", row)
         print(progress_line(row), file=sys.stderr, flush=True)
@@ -311,6 +315,16 @@ def append_row(path: Path, row: dict[str, float]) -> None:
         if new:
             writer.writeheader()
         writer.writerow(row)
+
+
+def rewind(path: Path, iteration: int) -> int:
+    """Remove the rows of a CSV file after an iteration; return the decisions so far, 0 without a file."""
+    if not path.is_file():
+        return 0
+    with path.open(newline="", encoding="utf-8") as file:
+        rows = [row for row in csv.DictReader(file) if int(row["iteration"]) <= iteration]
+    write_atomically(path, csv_table({name: [row[name] for row in rows] for name in rows[0]}))
+    return int(float(rows[-1]["decisions"]))
 
 
 def last_checkpoint(folder: Path) -> Path | None:

@@ -195,9 +195,7 @@ class Allocator:
     def _voxel_of(self, robot: int) -> int:
         """Return the voxel in which a robot was when it was last heard, in the layer of planar robots."""
         view = self._view
-        voxel = voxel_of(view, view.pose if robot == view.robot else view.teammates[robot].pose)
-        layer, layers = self._paths.lattice.layer, self._grid.shape[2]
-        return voxel if layer < 0 else voxel - voxel % layers + layer
+        return voxel_of(view, view.pose if robot == view.robot else view.teammates[robot].pose)
 
 
 def seconds_of(scenario: Scenario, robot: int, edges: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ import numpy as np
 from gymnasium import spaces
 
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
-from entropy_explore_env.errors import ActionError, MissingExtraError
+from entropy_explore_env.errors import ActionError, MissingExtraError, SettingError
 from entropy_explore_env.randomness import check_seed
 from entropy_explore_env.settings.validation import check_instance
 
@@ -56,9 +56,12 @@ class EntropyExploreMultiAgentEnv(MultiAgentEnv):
         if settings is not None:
             check_instance("settings", settings, Mapping)
         asked = dict(settings or {})
+        if not all(isinstance(name, str) for name in asked):
+            raise SettingError("settings", list(asked), "names of settings")
         run = asked.pop("seed", None)
         self._run = None if run is None else check_seed(run)
         self._runner = (getattr(settings, "num_workers", 0) or 0, getattr(settings, "worker_index", 0) or 0)
+        self._first_number: int | None = getattr(settings, "vector_index", 0) or 0
         self.team = EntropyExploreEnv(**asked)
         self.possible_agents = list(self.team.possible_agents)
         self.agents = list(self.possible_agents)
@@ -82,16 +85,19 @@ class EntropyExploreMultiAgentEnv(MultiAgentEnv):
         Args:
             seed: Of all random streams; None goes on to the next mission of the last seed. Where the
                 settings hold the `seed` of a run, RLlib's number only tells the environments of one
-                runner apart: see `runner_seed`.
+                runner apart, as its own index does at a first reset without a number: see `runner_seed`.
             options: As for `EntropyExploreEnv.reset`.
 
         Returns:
             Observations and infos of all robots: they all have to decide.
         """
-        if seed is not None and self._run is not None:
-            seed = runner_seed(self._run, *self._runner, seed)
+        if self._run is not None:
+            number = self._first_number if seed is None else check_seed(seed)
+            seed = None if number is None else runner_seed(self._run, *self._runner, number)
+        begun = self.team.reset(seed, options)
+        self._first_number = None
         self._earned = dict.fromkeys(self.possible_agents, 0.0)
-        return self.team.reset(seed, options)
+        return begun
 
     def step(
         self, action_dict: Mapping[str, Any]

@@ -134,7 +134,7 @@ class RobotVecEnv(VecEnv):
         """
         seeds: Any = self._first_seeds
         if seeds is None and self._seeds[0] is not None:
-            seeds = [self._seeds[row] for row in range(0, self.num_envs, self._robots)]
+            seeds = [self._seeds[0] + mission for mission in range(self._team[0])]
         seeds = [None] * self._team[0] if seeds is None else seeds
         observations, infos = self.vector_env.reset_missions(
             range(self._team[0]), seeds, self._fixed(self._options)

@@ -25,9 +25,15 @@ def belief_of(view: RobotKnowledge) -> Belief:
 
 
 def voxel_of(view: RobotKnowledge, pose: np.ndarray) -> int:
-    """Return the number of the voxel of a pose (3,) or (5,), map frame; the nearest one for poses outside."""
-    grid = view.scenario.grid
+    """Return the number of the voxel of a pose (3,) or (5,), map frame; the nearest one for poses outside.
+
+    Of a robot that stays in a layer, it is the voxel of that layer.
+    """
+    grid, kind = view.scenario.grid, view.scenario.kind_of(view.robot)
+    layer = view.scenario.layer_of(kind.robot)
     indices = np.clip(grid.voxel_of(pose[:3]), 0, np.array(grid.shape) - 1)
+    if layer is not None:
+        indices[2] = layer
     return int(np.ravel_multi_index(tuple(indices), grid.shape))
 
 

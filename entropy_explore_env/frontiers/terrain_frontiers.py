@@ -94,7 +94,7 @@ def new_terrain_map(
         spacing: Voxels between candidates, along all axes.
         ceiling: (X, Y) lowest layer of the no-fly zone.
     """
-    footprint, states = body_footprint((3, 3, 3), body_radius, None), new_states(shape, math.prod(shape))
+    footprint, states = body_footprint(shape, body_radius, None), new_states(shape, math.prod(shape))
     reach, voxels = int(np.abs(footprint).max()), math.prod(shape)
     square = np.array([(x, y, 0) for x in range(-reach, reach + 1) for y in range(-reach, reach + 1)])
     state = np.full(shape[0] * shape[1], UNEXPLORED | UNMAPPED, np.uint8)

@@ -63,9 +63,14 @@ def height_at(terrain, x, y, eye, average, reach):
 
 @lean_kernel
 def count_below(counter, terrain, eye, average, azimuths, model, marking):
-    """Count the unexplored columns that are seen from a place along (D, 2) float64 unit vectors."""
+    """Count the unexplored columns that are seen from a place along (D, 2) float64 unit vectors.
+
+    From places outside the map none is.
+    """
     number, points, weighed = start_count(counter), 0, 0.0
     size, reach = terrain.size, model.reach
+    if not (0.0 <= eye[0] < size[0] and 0.0 <= eye[1] < size[1]):
+        return points, weighed
     for direction in azimuths:
         x, y = int(eye[0]), int(eye[1])
         step_x, step_y = 1 if direction[0] > 0.0 else -1, 1 if direction[1] > 0.0 else -1

@@ -290,7 +290,11 @@ class Missions:
         before = self.state.truth[mission].copy()
         self._set_world(mission, changed_world(world, change))
         prior = float(self.rules.params["prior_precision"][0])
-        rescore(self.state, mission, before, self.state.truth[mission], prior)
+        more = rescore(self.state, mission, before, self.state.truth[mission], prior)
+        if self.scenario.ending.unseen_free_voxels is not None:
+            self.state.missions[mission]["explored_free_end"] += more
+            if self._returning is not None:
+                self._returning.free[mission] += more
 
     def _change_worlds(self) -> None:
         """Make the changes that are due and have no robot in their way."""

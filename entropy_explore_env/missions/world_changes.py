@@ -100,10 +100,14 @@ def robot_in_the_way(rules: Rules, state: MissionState, mission: int, change: Wo
     return None
 
 
-def rescore(state: MissionState, mission: int, before: np.ndarray, after: np.ndarray, prior: float) -> None:
-    """Bring the figures of the joint map up to date with a truth (V,) that has changed."""
+def rescore(state: MissionState, mission: int, before: np.ndarray, after: np.ndarray, prior: float) -> int:
+    """Bring the figures of the joint map up to date with a truth (V,) that has changed.
+
+    Returns:
+        By how many the visible free voxels are more than before.
+    """
     if not state.joint_mean.shape[1]:
-        return
+        return 0
     voxels = np.flatnonzero(before != after)
     mean, visible = state.joint_mean[mission, voxels], state.visible[mission, voxels]
     measured, clock = state.joint_precision[mission, voxels] > np.float32(prior), state.missions[mission]
@@ -112,5 +116,7 @@ def rescore(state: MissionState, mission: int, before: np.ndarray, after: np.nda
     wrong = ((mean > 0.5) != (now > 0.5)).astype(int) - ((mean > 0.5) != (was > 0.5))
     clock["wrong"] += int(wrong[measured].sum())
     freed = (now <= 0.5).astype(int) - (was <= 0.5)
-    clock["visible_free"] += int(freed[visible].sum())
+    more = int(freed[visible].sum())
+    clock["visible_free"] += more
     clock["explored_free"] += int(freed[visible & measured].sum())
+    return more

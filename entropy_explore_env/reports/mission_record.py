@@ -61,7 +61,7 @@ class Head(Form, kw_only=True, forbid_unknown_fields=True):
     library: _Text
     settings: dict[str, Any]
     seed: Annotated[str, msgspec.Meta(pattern="^[0-9]{1,4000}$")]
-    episode: Annotated[int, msgspec.Meta(ge=0, lt=1_000_000)]
+    episode: Annotated[int, msgspec.Meta(ge=0, lt=2**53)]
     strategy: _Text
     reward_function: _Text
     digest: _Digest

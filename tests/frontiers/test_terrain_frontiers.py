@@ -120,6 +120,9 @@ def test_a_ridge_hides_the_valley_behind_it_by_hand():
     ground[4] = 1
     flat = known_ground(ground, (9, 3, 8))
     assert count_below(counter, flat, (0.5, 1.5, 5.5), 1.0, east, view_model, False)[0] == 3
+    x, y, _ = flat.size
+    for outside in ((x, 1.5, 5.5), (x + 5.3, 1.5, 5.5), (0.5, y, 5.5), (-0.5, 1.5, 5.5), (0.5, -9.0, 5.5)):
+        assert count_below(counter, flat, outside, 1.0, east, view_model, True) == (0, 0.0)
 
 
 def test_candidates_hang_above_the_edge_between_ground_and_ceiling():

@@ -59,6 +59,24 @@ def test_figures_of_the_joint_map_follow_the_truth():
         assert clock["explored_free"] == (known & state.visible[0] & (truth < 0.5)).sum()
 
 
+@pytest.mark.parametrize("home", [False, True])
+def test_what_a_mission_asks_for_follows_the_truth(home):
+    """All but three free voxels, of 35 fewer while there is a wall."""
+    env = begun(ending={"unseen_free_voxels": 3, "return_to_start": home})
+    missions = env.missions
+
+    def asked():
+        goal = missions.state.missions[0]["explored_free_end"]
+        return missions._returning.free[0] if home else goal
+
+    assert asked() == 7 * 11 * 5 - 3
+    env.set_world_block((1.0, 3.0, 0.0), (1.5, 5.5, 2.5))
+    free = missions.state.missions[0]["visible_free"]
+    assert free == 7 * 11 * 5 - 25 and asked() == free - 3
+    env.set_world_block((1.0, 3.0, 0.0), (1.5, 5.5, 2.5), solid=False)
+    assert asked() == 7 * 11 * 5 - 3
+
+
 def test_a_door_closes_in_time_when_nobody_is_in_its_way():
     env = begun()
     env.set_world_block(*DOOR, at_s=1.0)

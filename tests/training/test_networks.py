@@ -146,6 +146,7 @@ def test_gazes_want_a_ray_for_each_gaze(change: dict[str, Any]) -> None:
 def test_normalisation_lies_beside_the_weights_and_stable_baselines3_saves_both(
     tmp_path: Path, features: str
 ) -> None:
+    torch.manual_seed(0)
     policy = make_policy(PolicySettings(scenario(), features, (8, 8)))
     assert not any(name.endswith((".mean", ".std")) for name in weights_of(policy))
     size = ObservationLayout(scenario()).size

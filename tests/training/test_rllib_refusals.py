@@ -1,5 +1,6 @@
 """What RLlib's trainer says to bad input, and what it keeps: none of this needs RLlib."""
 
+import dataclasses
 import errno
 import math
 import sys
@@ -129,6 +130,39 @@ def test_an_iteration_without_decisions_is_repeated_and_many_end_the_run(tmp_pat
     with pytest.raises(SilentRunnersError, match="none of 2 runners reported within 900 s, after 100 dec"):
         iterate(args_for(tmp_path, 900), Scripted([0.1, None, None, None, 0.1]), iteration=0)
     assert not iterate(args_for(tmp_path, 900), Scripted([None, 0.1]), iteration=0, asked=True)
+
+
+def test_a_silent_iteration_that_is_interrupted_leaves_a_checkpoint(tmp_path):
+    interruption = Interruption("it ends")
+    algorithm = Scripted([0.1, 0.1, 0.1, None])
+    train = algorithm.train
+
+    def train_until_silent():
+        interruption.asked = len(algorithm.losses) == 1
+        return train()
+
+    algorithm.train = train_until_silent
+    args = dataclasses.replace(args_for(tmp_path, 900), checkpoint_every=10)
+    assert not rllib_ppo.iterate(args, algorithm, 0, interruption, Unvalidated())
+    assert last_checkpoint(tmp_path) == tmp_path / "checkpoint-000003"
+
+
+def test_a_resumed_run_has_each_iteration_once(tmp_path):
+    """One of 300 decisions was killed before its last checkpoint."""
+    iterate(args_for(tmp_path, 300), Scripted([0.1] * 3), iteration=0)
+    (tmp_path / "checkpoint-000003").rename(tmp_path / "checkpoint-000002")
+    resumed = []
+
+    class Noted(Unvalidated):
+        def resume(self, decisions: int) -> None:
+            resumed.append(decisions)
+
+    again = Scripted([0.1] * 2)
+    again.done = 2
+    rllib_ppo.iterate(args_for(tmp_path, 400), again, 2, Interruption("it ends"), Noted())
+    rows = (tmp_path / "progress.csv").read_text().splitlines()
+    assert [row.split(",")[:2] for row in rows[1:]] == [[str(n), str(100 * n)] for n in range(1, 5)]
+    assert resumed == [200]
 
 
 def test_a_full_disk_keeps_the_last_checkpoint(tmp_path):

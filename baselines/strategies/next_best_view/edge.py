@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy import ndimage
 from skimage.draw import polygon2mask
 from skimage.measure import approximate_polygon, find_contours
 from skimage.morphology import isotropic_closing
@@ -43,7 +44,8 @@ def find_edge(
     alike = np.abs(height - height[here]) <= threshold
     grown = flood(alike, here, connectivity=1)
     plateau = np.asarray(isotropic_closing(grown, closing), bool) if closing > 0.0 else grown
-    contours = find_contours(np.pad(plateau, 1).astype(np.float64), 0.5)
+    whole = np.pad(np.asarray(ndimage.binary_fill_holes(plateau)), 1)
+    contours = find_contours(whole.astype(np.float64), 0.5)
     border = max(contours, key=len) - 0.5  # of the padded grid's middles: one column on, half a column back
     return Edge(plateau, border, approximate_polygon(border, tolerance))
 

@@ -209,6 +209,17 @@ def test_two_runners_never_share_a_seed_and_repeat_theirs():
     assert len({seed for seed, _ in starts.values()}) == len({start for _, start in starts.values()}) == 20
 
 
+def test_a_first_reset_without_a_number_has_the_seed_of_the_run():
+    env = EntropyExploreMultiAgentEnv({**BOX, "seed": 6})
+    seeds = []
+    for asked in (None, None, 3):
+        env.reset(seed=asked)
+        seeds.append(env.team.figures()["seed"])
+    assert seeds == [runner_seed(6, 0, 0, 0)] * 2 + [runner_seed(6, 0, 0, 3)]
+    with pytest.raises(SettingError, match="seed"):
+        env.reset(seed=-1)
+
+
 def test_runner_seed_keeps_every_number_apart():
     asked = [(r, n, w, p) for r in range(3) for n in range(3) for w in range(3) for p in range(3)]
     assert len({runner_seed(*numbers) for numbers in asked}) == len(asked)

@@ -54,6 +54,13 @@ def test_rocks_on_the_plateau_are_no_holes_and_another_plateau_is_not_the_rover_
     assert far.plateau[11:].all() and not far.plateau[:11].any()
 
 
+def test_the_border_is_the_outer_one_however_jagged_a_pit_is():
+    height = np.full((30, 30), 5.0)
+    height[8:22, 8:27:2] = height[8, 8:27] = 0.0
+    edge = find_edge(height, (2, 2), 1.0, 0.0, 0.4)
+    assert inside_polygon(edge.polygon, (30, 30)).sum() >= 30 * 30 - 4 and not edge.plateau[8, 8:27].any()
+
+
 def test_the_straight_edge_is_the_line_that_fits_the_border_within_the_workspace():
     height = np.where(np.add.outer(2.0 * np.arange(17), np.arange(23)) < 25, 5.0, 0.0)
     side = behind_line(find_edge(height, (1, 1), 1.0, 0.0, 0.4), (1, 1))
