@@ -113,7 +113,7 @@ class StepRewards:
         shape, given = robots.shape, self.function(figures)
         try:
             rewards = np.asarray(given)
-        except ValueError:  # lists of different lengths
+        except (ValueError, TypeError, RuntimeError):  # lists of different lengths, tensors with gradients
             rewards = np.asarray(None)
         if rewards.shape != shape or rewards.dtype.kind not in "fiu" or not np.isfinite(rewards).all():
             allowed = f"finite numbers of shape {shape}: one for each mission and robot"

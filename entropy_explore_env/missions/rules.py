@@ -60,6 +60,7 @@ PARAMS = record_type(
         ("wall_loss_db_per_m", "f8"),
         ("loss_probability", "f8"),
         ("delay_s", "f8"),
+        ("longest_delay_s", "f8"),  # with that of late messages
         ("announcements", "?"),
         ("phase_s", "f8"),
         ("summary_every_s", "f8"),  # 0 where no summaries are sent
@@ -138,6 +139,7 @@ def rules_of(scenario: Scenario) -> Rules:
         "wall_loss_db_per_m": channel.signal.wall_loss_db_per_m,
         "loss_probability": channel.loss_probability,
         "delay_s": channel.delay_s,
+        "longest_delay_s": scenario.longest_delay_s,
         "announcements": channel.announcements,
         "phase_s": channel.phase_s,
         "summary_every_s": channel.summary_every_s if scenario.shares_summaries else 0.0,

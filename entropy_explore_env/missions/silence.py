@@ -18,7 +18,7 @@ def is_silent(params, heard, time_s):
 
     Until it must be heard again it may drive, for twice the time of the straight drive to the viewpoint that
     it announced, turn half round, scan, and wait behind a teammate; its message may wait for the end of a
-    phase, or for the time between summaries, and be delayed.
+    phase, or for the time between summaries, and be delayed or late.
     """
     unheard_s = time_s - heard["heard_s"]
     if heard["heard_s"] < 0.0 or unheard_s <= SILENT_AFTER_S:
@@ -29,7 +29,7 @@ def is_silent(params, heard, time_s):
         drive_m = math.sqrt((there[0] - was[0]) ** 2 + (there[1] - was[1]) ** 2 + (there[2] - was[2]) ** 2)
     drive_s = _DETOURS * driving_time(drive_m, params["max_speed_m_s"], params["acceleration_m_s2"])
     stands_s = math.pi / params["turn_rate_rad_s"] + params["scan_time_s"] + params["blocked_wait_s"]
-    message_s = params["phase_s"] + params["summary_every_s"] + params["delay_s"]
+    message_s = params["phase_s"] + params["summary_every_s"] + params["longest_delay_s"]
     return unheard_s > SILENT_AFTER_S + drive_s + stands_s + message_s
 
 

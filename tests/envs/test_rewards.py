@@ -16,6 +16,7 @@ from entropy_explore_env.reports.mission_record import CommandRecorder
 from entropy_explore_env.settings.robot import Robot
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.sensor import RangeSensor
+from tests.envs.bad_values import Unprintable
 
 FAST = Robot(max_speed_m_s=0.5, acceleration_m_s2=0.5, reach_m=1.0, body_radius_m=0.1)
 SLOW = Robot(max_speed_m_s=0.125, acceleration_m_s2=0.125, reach_m=1.0, body_radius_m=0.1)
@@ -154,7 +155,10 @@ def without_scenario() -> dict[str, Any]:
     return {name: value for name, value in BOX.items() if name != "scenario"}
 
 
-@pytest.mark.parametrize("wrong", [3.0, "text", None, [[1.0], [2.0, 3.0]], np.zeros((2, 1)), [[True, False]]])
+@pytest.mark.parametrize(
+    "wrong",
+    [3.0, "text", None, [[1.0], [2.0, 3.0]], np.zeros((2, 1)), [[True, False]], Unprintable()],
+)
 def test_what_is_no_reward_is_refused_by_name(wrong: Any) -> None:
     team = parallel_env(**BOX, reward_function=lambda figures: wrong)
     team.reset(seed=0)

@@ -89,6 +89,7 @@ def silent_views(unheard_s, **changes):
         ({}, 10.0 + 2 * 3.0 + 0.5),  # 1 m at 0.5 m/s and 0.5 m/s²: 3 s; the scan takes 0.5 s
         ({"channel": {"delay_s": 2.0}}, 12.0 + 2 * 3.0 + 0.5),
         ({"channel": {"phase_s": 4.0}}, 14.0 + 2 * 3.0 + 0.5),
+        ({"faults": {"radio": {"late": 0.5, "late_s": 7.0}}}, 17.0 + 2 * 3.0 + 0.5),
     ],
 )
 def test_a_teammate_that_is_not_heard_for_long_is_silent_and_its_place_is_free(changes, limit_s):
