@@ -62,7 +62,7 @@ _NOT_TOLD = (*_WHERE, "--rerun", "--since")
 """Options that a page does not tell."""
 _OF_CHECK = ("check", "json", "jobs", "cluster")
 _OF_PAGE = ("out", "runs", "archive", "cite", "tables")
-"""Options of what a run writes that is no entry."""
+"""Options of a run's page, which an entry does not have."""
 
 
 @dataclass

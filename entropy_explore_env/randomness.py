@@ -59,7 +59,7 @@ def check_seed(seed: object) -> int:
     if not is_whole(seed, 0):
         raise SettingError("seed", seed, "a whole number ≥ 0, or None")
     if int(seed) >= _SEEDS:
-        raise SettingError("seed", "a longer number", "at most 4000 digits, which records hold")
+        raise SettingError("seed", f"a number of {int(seed).bit_length()} bits", "at most 4000 digits")
     return int(seed)
 
 

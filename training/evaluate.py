@@ -93,7 +93,8 @@ def main(words: Sequence[str]) -> int:
     base = base_task(evaluation_scenario(trained, args.scenario, args.robots), args.task.settings)
     if args.scenario is not None and is_whole_scenario(args.task.settings):
         raise SettingError("scenario", args.scenario, "no value: --settings holds a scenario of its own")
-    if args.task.settings is None or "split" not in settings_in(args.task.settings):
+    given = {} if args.task.settings is None else settings_in(args.task.settings)
+    if "split" not in given or is_whole_scenario(args.task.settings):
         base = base._replace(scenario=with_settings(base.scenario, {"split": "test"}))
     args = parsed_for(base, args, words)
     elsewhere = args.scenario or args.task.settings or args.task.world

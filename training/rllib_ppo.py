@@ -235,8 +235,9 @@ def iterate(
     """
     assert args.out is not None
     begun, steps, silent, started = iteration, 0, 0, time.perf_counter()
-    if begun:
-        validation.resume(rewind(args.out / "progress.csv", begun))
+    done = rewind(args.out / "progress.csv", begun)
+    if done is not None:
+        validation.resume(done)
     while steps < args.total_steps:
         result = algorithm.train()
         if decisions_of(result) == steps:
@@ -317,12 +318,18 @@ def append_row(path: Path, row: dict[str, float]) -> None:
         writer.writerow(row)
 
 
-def rewind(path: Path, iteration: int) -> int:
-    """Remove the rows of a CSV file after an iteration; return the decisions so far, 0 without a file."""
-    if not path.is_file():
-        return 0
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = [row for row in csv.DictReader(file) if int(row["iteration"]) <= iteration]
+def rewind(path: Path, iteration: int) -> int | None:
+    """Remove the rows of a CSV file after an iteration; return the decisions so far, None without a row."""
+    rows = []
+    if path.is_file():
+        with path.open(newline="", encoding="utf-8") as file:
+            for row in csv.DictReader(file):
+                whole = row["iteration"].isdigit() and None not in row.values()  # a killed run may cut one
+                if whole and int(row["iteration"]) <= iteration:
+                    rows.append(row)
+    if not rows:
+        path.unlink(missing_ok=True)
+        return None
     write_atomically(path, csv_table({name: [row[name] for row in rows] for name in rows[0]}))
     return int(float(rows[-1]["decisions"]))
 

@@ -162,7 +162,7 @@ def _idle_action(env: EntropyExploreEnv, agent: str) -> np.ndarray | np.int64:
 
 
 def counted_time_s(figures: Mapping[str, Any], scenario: Scenario) -> float:
-    """Return the time that a mission counts with: the time limit if it did not come to what it asks for."""
+    """Return the time that a mission counts with: the time limit if it did not finish."""
     limit_s = scenario.ending.time_limit_s
     if figures["finished"] or math.isinf(limit_s):
         return float(figures["t_mission_s"])

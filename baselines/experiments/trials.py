@@ -188,7 +188,7 @@ def _progressing(results: Iterator[Item], done: int, total: int, how: How) -> It
 
 
 FAILED = frozenset({"failed", "trace", "limit_s"})
-"""What is kept of a trial that failed."""
+"""Keys of a failed trial's record."""
 
 
 def failed_record(failure: Failure, limit_s: float) -> Record:

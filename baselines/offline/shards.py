@@ -146,22 +146,26 @@ class Shard:
 
 
 def refuse_others(shards: Sequence[Shard], rows: Iterable[kept_rows.Row]) -> None:
-    """Refuse a folder that has files of other missions, or of the same ones in other files.
+    """Refuse a folder that would hold the same missions in two files, or others beside these.
 
     Args:
         shards: All that a command writes.
         rows: Of the folder's table.
 
     Raises:
-        SettingError: It has such a file.
+        SettingError: The folder has such a file beside those of the command.
     """
     ours, first, last = {shard.path for shard in shards}, shards[0].seed, shards[-1]
-    asked = {**shards[0].settings, "missions": None}
     for row in rows:
-        file = file_of(Path(shards[0].out), row.seed)
-        if file in ours or not file.is_file():
-            continue
-        apart = row.seed >= last.seed + last.missions or row.seed + row.settings["missions"] <= first
-        if not apart or {**row.settings, "missions": None} != asked:
+        file, missions = file_of(Path(shards[0].out), row.seed), row.settings.get("missions")
+        if file in ours or not file.is_file() or file.stat().st_size != row.record.get("bytes"):
+            continue  # written again, removed, or written again before
+        apart = row.seed >= last.seed + last.missions or row.seed + (missions or 0) <= first
+        if not apart or _alike(row.settings) != _alike(shards[0].settings):
             allowed = f"a folder without {file.name}, which holds these missions in another form, or others"
             raise SettingError("out", shards[0].out, allowed)
+
+
+def _alike(settings: dict[str, Any]) -> dict[str, Any]:
+    """Return what files of one dataset have in common."""
+    return {name: value for name, value in settings.items() if name not in ("missions", "pyarrow")}

@@ -22,6 +22,7 @@ from entropy_explore_env.explorer.given_maps import (
     Values,
     checked_origin,
     has_size,
+    numbers_of,
     occupancies_of,
     patch_of_map,
     patch_of_occupancies,
@@ -181,10 +182,14 @@ class Explorer:
                 nothing that is known. Nothing has changed then.
         """
         if isinstance(grid, Map):
-            if origin is not None or values is not None or bottom_m != 0.0:
-                raise SettingError(
-                    "grid", grid, "an array beside origin, bottom_m or values, which a Map has"
-                )
+            for name, value, usual in (
+                ("origin", origin, origin is None),
+                ("bottom_m", bottom_m, is_number(bottom_m) and bottom_m == 0.0),
+                ("values", values, values is None),
+                ("unknown_between", unknown_between, unknown_between is UNKNOWN_BETWEEN),
+            ):
+                if not usual:
+                    raise SettingError(name, value, "no value beside a Map")
             self._take_map(patch_of_map(grid, self._task))
             return
         given = occupancies_of(grid, values, unknown_between)
@@ -235,13 +240,7 @@ class Explorer:
                 Nothing has changed then.
         """
         number, place = self._checked_robot(robot), checked_pose("pose", pose)
-        try:
-            values = np.array(measured, np.float64)
-        except (TypeError, ValueError):
-            allowed = (
-                "an array of numbers: ranges (R,), or points (N, 3), as of sensor_msgs_py's read_points_numpy"
-            )
-            raise SettingError("measured", measured, allowed) from None
+        values = numbers_of(measured)
         sensor, points = self._task.kind_of(number).sensor, values.ndim == 2 and values.shape[1] == 3
         rays = sensor.columns if self._ground.flat else sensor.rays
         if points and not np.isfinite(values).all():
@@ -281,7 +280,7 @@ class Explorer:
             robot: Number of the robot that decides.
             ended: How its latest drive ended; None = it arrived if it is near to its goal, or had none, and
                 is under way otherwise. A drive that was blocked is not tried again at once.
-            time_s: Now; None = as late as the robot should need for what it has done of its latest goal.
+            time_s: Now; None = estimated from the progress of its latest drive.
 
         Raises:
             CallOrderError: Neither a map nor a scan was given.

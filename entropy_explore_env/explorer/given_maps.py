@@ -213,3 +213,19 @@ def patch_of_occupancies(
     sigma = _FINER * min(_KNOWN_SIGMA, task.ending.sigma_end)
     precisions = np.float32(task.sigma_prior**-2), np.float32(sigma**-2)
     return Patch(given, _known_box(given), corner, bottom_m, precisions)
+
+
+def numbers_of(measured: object) -> np.ndarray:
+    """Return what a scan measured as a float64 array.
+
+    Raises:
+        SettingError: It holds something else than numbers.
+    """
+    try:
+        given = np.asarray(measured)
+    except (TypeError, ValueError, RuntimeError):  # lists of different lengths, tensors with gradients
+        given = np.asarray(None)
+    if given.dtype.kind not in "fiu":
+        allowed = "numbers: ranges (R,), or points (N, 3), as of sensor_msgs_py's read_points_numpy"
+        raise SettingError("measured", measured, allowed)
+    return given.astype(np.float64)

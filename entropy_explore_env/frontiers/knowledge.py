@@ -27,7 +27,7 @@ def belief_of(view: RobotKnowledge) -> Belief:
 def voxel_of(view: RobotKnowledge, pose: np.ndarray) -> int:
     """Return the number of the voxel of a pose (3,) or (5,), map frame; the nearest one for poses outside.
 
-    Of a robot that stays in a layer, it is the voxel of that layer.
+    If the view's robot stays in a layer, the voxel lies in that layer.
     """
     grid, kind = view.scenario.grid, view.scenario.kind_of(view.robot)
     layer = view.scenario.layer_of(kind.robot)

@@ -65,7 +65,7 @@ def height_at(terrain, x, y, eye, average, reach):
 def count_below(counter, terrain, eye, average, azimuths, model, marking):
     """Count the unexplored columns that are seen from a place along (D, 2) float64 unit vectors.
 
-    From places outside the map none is.
+    No column is seen from outside the map.
     """
     number, points, weighed = start_count(counter), 0, 0.0
     size, reach = terrain.size, model.reach

@@ -197,7 +197,7 @@ class BagReader:
                 message = reader.deserialize(raw, connection.msgtype)
                 placed = [message] if connection.msgtype == _ODOMETRY else message.transforms
                 found[connection.msgtype] += [each.child_frame_id.lstrip("/") for each in placed]
-        robots = _bases_of(found[_ODOMETRY]) or list(dict.fromkeys(found[_ODOMETRY])) or _bases_of(found[_TF])
+        robots = _robots_of(found[_ODOMETRY]) or _bases_of(found[_TF])
         if not robots:
             raise RecordError("bag", str(self.path), "a bag with Odometry, or tf of a base_link: poses")
         return robots
@@ -274,6 +274,14 @@ class BagReader:
         points = points_of_cloud(message) @ frame[:3, :3].T + frame[:3, 3]
         robot = self._carrier(message.header.frame_id.lstrip("/"), frames)
         return ScanHeard(time_s, robot, pose_of_matrix(frame), points, poses)
+
+
+def _robots_of(frames: list[str]) -> list[str]:
+    """Return the frames of Odometry but those of parts of a robot whose base has Odometry, too."""
+    bases = _bases_of(frames)
+    namespaces = {base.rpartition("/")[0] for base in bases}
+    others = [frame for frame in frames if frame.rpartition("/")[0] not in namespaces]
+    return bases + list(dict.fromkeys(others))
 
 
 def _bases_of(frames: list[str]) -> list[str]:

@@ -104,7 +104,7 @@ def rescore(state: MissionState, mission: int, before: np.ndarray, after: np.nda
     """Bring the figures of the joint map up to date with a truth (V,) that has changed.
 
     Returns:
-        By how many the visible free voxels are more than before.
+        Change in the number of visible free voxels.
     """
     if not state.joint_mean.shape[1]:
         return 0

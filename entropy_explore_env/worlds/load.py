@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
-import os
 import warnings
 from functools import lru_cache
 from pathlib import Path
@@ -275,7 +275,7 @@ def world_from_file(path: Path | str, voxel_size_m: float, **options: Any) -> Wo
         raise SettingError("Scenario.world", str(path), allowed + did_you_mean(str(path), (*RECIPES, *NAMES)))
     options["voxel_size_m"] = voxel_size_m
     check_options(options)
-    path = path if str(path) in NAMES else Path(os.path.normpath(path.absolute()))  # links are kept
+    path = path if str(path) in NAMES else path.parent.resolve() / path.name  # a link keeps its name
     return _cached_world(path, _file_version(path), tuple(sorted(options.items())))
 
 
@@ -284,12 +284,14 @@ def _file_version(path: Path) -> tuple[tuple[str, int, int], ...]:
 
     A YAML names an image in its folder: all files there count.
     """
-    files = path.parent.iterdir() if path.suffix.lower() in (".yaml", ".yml") else (path,)
-    try:
-        found = sorted((file.name, file.stat()) for file in files)
-    except OSError:  # a name, or a missing file, which reading reports
-        return ()
-    return tuple((name, about.st_mtime_ns, about.st_size) for name, about in found)
+    found = []
+    with contextlib.suppress(OSError):  # a missing folder, which reading reports
+        files = path.parent.iterdir() if path.suffix.lower() in (".yaml", ".yml") else (path,)
+        for file in files:
+            with contextlib.suppress(OSError):  # a name, a missing file, or a link to none
+                about = file.stat()
+                found.append((file.name, about.st_mtime_ns, about.st_size))
+    return tuple(sorted(found))
 
 
 @lru_cache(maxsize=4)

@@ -296,7 +296,7 @@ def bad_calls(explorer, seen):
             lambda: explorer.set_map(seen, origin=(1e9, 0.0, 0.0)),
             r"origin = \(1000000000.0, 0.0, 0.0\): .*near",
         ),
-        (lambda: explorer.set_map(explorer.map, origin=(9.0, 0.0, 0.0)), "grid = .*an array beside origin"),
+        (lambda: explorer.set_map(explorer.map, origin=(9.0, 0.0, 0.0)), "origin = .*no value beside a Map"),
         (lambda: explorer.set_map(seen.tolist()), r"grid = .*a NumPy array \(X, Y\)"),
         (lambda: explorer.set_map(seen + 4.5), "grid = .*probabilities from 0 to 1"),
         (lambda: explorer.set_map((seen > 50).astype(int)), "grid = .*booleans, or values='percent'"),
@@ -307,7 +307,10 @@ def bad_calls(explorer, seen):
         (lambda: explorer.add_scan(START, np.ones(7)), r"measured = \(7,\): .*\(180,\) ranges"),
         (lambda: explorer.add_scan(far[0] * np.nan, np.ones(180)), "pose = .*five finite numbers"),
         (lambda: explorer.add_scan(START, np.full((2, 3), np.nan)), "measured = .*finite points"),
+        (lambda: explorer.set_map(explorer.map, bottom_m=np.zeros(3)), "bottom_m = .*no value beside a Map"),
         (lambda: explorer.add_scan(START, np.zeros(4, [("x", "f4"), ("y", "f4")])), "measured = .*numbers"),
+        (lambda: explorer.add_scan(START, ["1.0"] * 180), "measured = .*numbers"),
+        (lambda: explorer.add_scan(START, [10**400] * 180), "measured = .*numbers"),
     ]
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.errors import EntropyExploreError, RecordError
+from entropy_explore_env.missions.faults import OUTAGES
 from entropy_explore_env.missions.simulation import Missions
 from entropy_explore_env.missions.snapshot import restore, snapshot
 from entropy_explore_env.missions.state import FROM_WORLD, state_arrays
@@ -25,6 +26,7 @@ SPOILED = {
         "robots.origin": [1e9],
         "robots.target": [1e4],
         "robots.move_end": [99],
+        "robots.ready_s": [math.inf],
         "robots.depart_s": [1e6],
         "robots.departed_m": [-1.0],
         "robots.half_angle_rad": [4.0],
@@ -113,6 +115,22 @@ def test_a_number_that_no_mission_holds_is_refused_by_name(kind, place, value):
     assert everything(others) == before
 
 
+ENDLESS = {
+    "in_flight.due_s",
+    "robots.redecide_s",
+    *("robots.ready_s", "robots.next_scan_s"),  # of robots that stop for good
+    *(f"faults.{name}{end}_s" for name in OUTAGES for end in ("", "_until")),
+}
+"""Fields that may be infinite: what never happens."""
+
+
+def extremes_of(kind, endless):
+    if kind.kind == "f":
+        return (math.nan, -math.inf) if endless else (math.nan, -math.inf, math.inf)
+    about = np.iinfo(kind)
+    return (about.max,) if about.min == 0 else (about.min, about.max)
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_field_takes_what_is_no_number_or_beyond_all_ranges(kind):
     missions = walked(kind, 12)
@@ -125,8 +143,7 @@ def test_no_field_takes_what_is_no_number_or_beyond_all_ranges(kind):
             numbers = array[field] if field else array
             if not numbers.size or numbers.dtype in (bool, np.uint64):  # any number is a generator's state
                 continue
-            extremes = (math.nan, -math.inf) if numbers.dtype.kind == "f" else (np.iinfo(numbers.dtype).max,)
-            for value in extremes:
+            for value in extremes_of(numbers.dtype, f"{name}.{field}" in ENDLESS):
                 numbers[(-1,) * numbers.ndim] = value
                 with pytest.raises(RecordError) as raised:
                     check_ranges(missions.scenario, {**arrays, name: array})

@@ -163,6 +163,8 @@ def test_a_resumed_run_has_each_iteration_once(tmp_path):
     rows = (tmp_path / "progress.csv").read_text().splitlines()
     assert [row.split(",")[:2] for row in rows[1:]] == [[str(n), str(100 * n)] for n in range(1, 5)]
     assert resumed == [200]
+    rllib_ppo.iterate(args_for(tmp_path, 100), Scripted([0.1]), 0, Interruption("it ends"), Noted())
+    assert len((tmp_path / "progress.csv").read_text().splitlines()) == 2 and resumed == [200]
 
 
 def test_a_full_disk_keeps_the_last_checkpoint(tmp_path):

@@ -111,6 +111,7 @@ def test_a_file_that_was_written_again_is_read_again(tmp_path):
     text.write_text(
         "image: plan.pgm\nresolution: 0.05\norigin: [0, 0, 0]\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
     )
+    (tmp_path / "nowhere").symlink_to(tmp_path / "missing")
     plan[10:20, 30] = 0
     assert world_from_file(text, 0.05).occupied.sum() == 0
     path.write_bytes(pgm(plan))
