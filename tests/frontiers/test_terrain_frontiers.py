@@ -125,6 +125,12 @@ def test_a_ridge_hides_the_valley_behind_it_by_hand():
         assert count_below(counter, flat, outside, 1.0, east, view_model, True) == (0, 0.0)
 
 
+@pytest.mark.parametrize("radius", [0.0, 2.0, 4.0, 6.0])
+def test_the_whole_body_counts_however_large_it_is(radius):
+    footprint = new_terrain_map((20, 24, 16), radius, 3, np.full((20, 24), 16, np.int32)).footprint
+    assert np.abs(footprint).max() == radius
+
+
 def test_candidates_hang_above_the_edge_between_ground_and_ceiling():
     ground = np.ones((9, 13), np.int32)
     ground[5:] = NONE

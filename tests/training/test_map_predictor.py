@@ -101,6 +101,12 @@ def test_samples_are_of_what_was_seen_and_what_is_there(whole):
     assert seen_free.any() and samples.truth[seen_free].mean() < 0.02
 
 
+def test_samples_of_other_options_are_other_files(tmp_path):
+    asked = [sampled_missions(RECIPES_HERE, "train", 2, *more) for more in ((3, 1), (4, 1), (3, 2))]
+    files = [map_samples.file_of(tmp_path, each) for some in asked for each in some]
+    assert len(set(files)) == 3 * 2 * len(RECIPES_HERE)
+
+
 def test_missions_are_of_their_split_and_dungeons_of_odd_number():
     named = {"train": set(), "validation": set()}
     for split, names in named.items():

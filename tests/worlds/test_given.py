@@ -144,6 +144,11 @@ def test_plans_of_different_sizes_share_a_grid(tmp_path):
     scenario, given = with_given_worlds(start, {"world": paths})
     assert scenario.grid.shape == (30, 40, 1) and [each.name for each in given] == ["a", "b"]
     assert [int((~each.occupied).sum()) for each in given] == [600, 400]
+    unknown = load_world(paths[0]).occupied.copy()
+    unknown[:3] = True
+    part = World(Grid((30, 20, 1), 0.05), unknown, "part", unknown=unknown)
+    wide = with_given_worlds(start, {"world": [part, load_world(paths[1])]})[1][0]
+    assert wide.grid.shape == (30, 40, 1) and wide.unknown is not None and wide.unknown.sum() == 60
     worlds = [load_world(path) for path in paths]
     for several in (worlds, [paths[0], worlds[1]]):
         for one, two in zip(with_given_worlds(start, {"world": several})[1], given, strict=True):
