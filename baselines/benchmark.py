@@ -125,9 +125,9 @@ def main(words: Sequence[str]) -> int:
     if args.check is not None:
         _refuse_beside("check", words, lambda name: name not in _OF_CHECK)
         return _check(args.check, args)
-    if args.entry is not None and not (args.suite and args.strategies and args.author.strip()):
-        raise SettingError("entry", str(args.entry), "--suite, --strategies and --author beside it")
     if args.entry is not None:
+        if not (args.suite and args.strategies and args.author.strip()):
+            raise SettingError("entry", str(args.entry), "--suite, --strategies and --author beside it")
         _refuse_beside("entry", words, lambda name: name in _OF_PAGE)
     suite, refused = _suite(args, words)
     stop_after_s = math.inf if args.stop_after_s is None else args.stop_after_s

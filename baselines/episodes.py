@@ -85,8 +85,9 @@ def main(words: Sequence[str]) -> int:
         for missions in [min(args.missions_per_file, args.missions - done)]
     ]
     table = args.out / ROWS
-    refuse_others(shards, read_table(table))
-    kept = {row.key: row.record for row in read_table(table)}
+    rows = read_table(table)
+    refuse_others(shards, rows)
+    kept = {row.key: row.record for row in rows}
     lost = [shard for shard in shards if shard.key in kept and not shard.is_whole(kept[shard.key])]
     run_trials(lost, table, dataclasses.replace(how, rerun=True, since=None))
     records = [row.record for row in run_trials(shards, table, how) if row is not None]

@@ -26,6 +26,10 @@ from entropy_explore_env.version import VERSION
 
 _COMPILER = "llvmlite"
 """What Numba compiles with: of another version than Numba wants, kernels do not compile."""
+_OURS = "entropy_explore_env"
+_FOR_DEVELOPERS = ("test", "dev")
+"""Extras for developers of the project: left out."""
+_OF_EXTRA = re.compile(r"""\bextra == ["']([^"']+)["']""")
 
 
 def main(words: Sequence[str]) -> int:
@@ -134,12 +138,6 @@ def _writable(folder: Path) -> bool:
             return True
     except OSError:
         return False
-
-
-_OURS = "entropy_explore_env"
-_FOR_DEVELOPERS = ("test", "dev")
-"""Extras for developers of the project: left out."""
-_OF_EXTRA = re.compile(r"""\bextra == ["']([^"']+)["']""")
 
 
 def needed() -> list[str]:

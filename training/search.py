@@ -114,9 +114,8 @@ def main(words: Sequence[str]) -> int:
     scenarios = tuple(learned_scenario(task) for task in args.tasks)
     begun = PlannerWeights(candidates=args.candidates) if args.begin is None else read_weights(args.begin)
     if "candidates" in given_values(Args, words) and args.candidates != begun.candidates:
-        raise SettingError(
-            "candidates", args.candidates, f"{begun.candidates}, as the weights in --begin have"
-        )
+        allowed = f"{begun.candidates}, as the weights in --begin have"
+        raise SettingError("candidates", args.candidates, allowed)
     workers = args.workers
     make_folder("out", args.out)
     origin = {name: getattr(args, name) for name in ("rounds", "pairs", "sigma", "step", "seed")}

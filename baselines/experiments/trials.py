@@ -347,7 +347,7 @@ def _strategy_files(name: str) -> list[Path]:
 
 
 def _file_of_module(name: str) -> Path | None:
-    """Return the file of a module; None if there is none."""
+    """Return the file that a module is read from, or None where it has none."""
     try:
         spec = importlib.util.find_spec(name)
     except ModuleNotFoundError:

@@ -80,15 +80,17 @@ class Frames:
 
     def to(self, above: str, frame: str) -> np.ndarray | None:
         """Return the matrix (4, 4) from a frame to one above it; None = no links lead there."""
+        return next((matrix for name, matrix in self.chain(frame) if name == above), None)
+
+    def chain(self, frame: str) -> Iterator[tuple[str, np.ndarray]]:
+        """Yield a frame and those above it, each with the matrix (4, 4) from the frame to it."""
         matrix, at = np.eye(4), frame.lstrip("/")
         for _ in range(_MOST_LINKS):
-            if at == above:
-                return matrix
+            yield at, matrix
             if at not in self.links:
-                return None
+                return
             at, link = self.links[at]
             matrix = link @ matrix
-        return None
 
 
 def points_of_cloud(message: Any) -> np.ndarray:  # noqa: ANN401 - a PointCloud2
@@ -247,13 +249,9 @@ class BagReader:
 
     def _carrier(self, frame: str, frames: Frames) -> int:
         """Return the robot that carries a frame: the first one above it, or one of its namespace; else 0."""
-        at = frame
-        for _ in range(_MOST_LINKS):
+        for at, _ in frames.chain(frame):
             if at in self.robots:
                 return self.robots.index(at)
-            if at not in frames.links:
-                break
-            at, _ = frames.links[at]
         namespaces = [name.split("/")[0] for name in self.robots]
         namespace = frame.split("/")[0]
         return namespaces.index(namespace) if namespace in namespaces else 0

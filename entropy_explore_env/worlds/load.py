@@ -18,6 +18,7 @@ from entropy_explore_env.settings.scenarios import find_scenario
 from entropy_explore_env.settings.validation import check_instance, checked_path, is_whole
 from entropy_explore_env.worlds.files.archives import restored, saved
 from entropy_explore_env.worlds.files.jacksboro import NAME as JACKSBORO
+from entropy_explore_env.worlds.files.map_server import image_of
 from entropy_explore_env.worlds.files.process import Format, Limits, read_apart
 from entropy_explore_env.worlds.files.resampling import resampled
 from entropy_explore_env.worlds.files.voxels import (
@@ -279,24 +280,35 @@ def world_from_file(path: Path | str, voxel_size_m: float, **options: Any) -> Wo
     return _cached_world(path, _file_version(path), tuple(sorted(options.items())))
 
 
-def _file_version(path: Path) -> tuple[tuple[str, int, int], ...]:
-    """Return name, time of the last change and size of a file: a changed file is read again.
+def _file_version(path: Path) -> tuple[tuple[int, int], ...]:
+    """Return time of the last change and size of a file, and of the image of a YAML.
 
-    A YAML names an image in its folder: all files there count.
+    What has changed is read again.
     """
-    found = []
-    with contextlib.suppress(OSError):  # a missing folder, which reading reports
-        files = path.parent.iterdir() if path.suffix.lower() in (".yaml", ".yml") else (path,)
-        for file in files:
-            with contextlib.suppress(OSError):  # a name, a missing file, or a link to none
-                about = file.stat()
-                found.append((file.name, about.st_mtime_ns, about.st_size))
-    return tuple(sorted(found))
+    versions = []
+    with contextlib.suppress(OSError, ImportError, RefusedError):  # a name, or what reading reports
+        versions.append(_changed(path))
+        if path.suffix.lower() in (".yaml", ".yml"):
+            versions.append(_changed(_image_of(path, versions[0])))
+    return tuple(versions)
+
+
+def _changed(path: Path) -> tuple[int, int]:
+    """Return the time of the last change of a file, and its size."""
+    about = path.stat()
+    return about.st_mtime_ns, about.st_size
+
+
+@lru_cache(maxsize=64)
+def _image_of(path: Path, version: tuple[int, int]) -> Path:
+    """Return the image of a map_server's YAML."""
+    del version  # part of the key of the cache
+    return image_of(path)
 
 
 @lru_cache(maxsize=4)
 def _cached_world(
-    path: Path, version: tuple[tuple[str, int, int], ...], options: tuple[tuple[str, Any], ...]
+    path: Path, version: tuple[tuple[int, int], ...], options: tuple[tuple[str, Any], ...]
 ) -> World:
     del version  # part of the key of the cache
     return load_world(path, **dict(options))

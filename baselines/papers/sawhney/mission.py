@@ -30,6 +30,13 @@ from entropy_explore_env.writing import write_atomically
 
 MARKS = (0.5, 0.9, 0.95, 0.99)
 """Explored shares at which the time is taken."""
+CEILING_M = 4.0
+"""Height of the exposure surface above the ground."""
+_FOLDER = tempfile.TemporaryDirectory(prefix="entropy_explore_env-")
+ACROSS, UP = 400.0, 50.0
+"""Scales of the model."""
+_METRES_PER_DEGREE = 111_195.0
+"""Along a meridian."""
 _KEPT = ("seed", "scans", "distance_m", "blocked_moves", "robots")
 
 
@@ -101,15 +108,6 @@ def _reached(times_s: Sequence[float], shares: Sequence[float], mark: float, lim
 def _over_model(scenario: Scenario) -> EntropyExploreEnv:
     """Return an environment over the model of real ground, kept for the next mission."""
     return EntropyExploreEnv(scenario, world={"path": model_file(), "ceiling_m": CEILING_M})
-
-
-CEILING_M = 4.0
-"""Height of the exposure surface above the ground."""
-_FOLDER = tempfile.TemporaryDirectory(prefix="entropy_explore_env-")
-ACROSS, UP = 400.0, 50.0
-"""Scales of the model."""
-_METRES_PER_DEGREE = 111_195.0
-"""Along a meridian."""
 
 
 @lru_cache(maxsize=1)

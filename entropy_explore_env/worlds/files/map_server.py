@@ -122,6 +122,15 @@ def labelling(
     return label
 
 
+def image_of(path: Path) -> Path:
+    """Return the path of the image that a YAML names.
+
+    Raises:
+        RefusedError: It is no YAML of map_server, or its image is not there.
+    """
+    return _image(path, _about(path))[0]
+
+
 def _about(path: Path) -> dict[str, Any]:
     """Return the entries of the YAML as texts, since 5e-2 and "0.05" are numbers to map_server.
 
