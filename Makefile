@@ -28,7 +28,7 @@ help:
 	@echo "make test-benchmarl   the tutorial with BenchMARL"
 	@echo "make lint         ruff, pyright and the contracts of imports"
 	@echo "make bench        speed against peers"
-	@echo "make predictor    trains the network that predicts maps: about an hour of a processor"
+	@echo "make predictor    trains the networks that predict maps: two hours of a processor"
 	@echo "make policy       searches weights of the planner's features: one to three hours of two processors"
 	@echo "make reliability  all proofs, into docs/results/reliability.md: many hours"
 	@echo "make night        some minutes of each proof, other cases every night"
@@ -84,9 +84,10 @@ bench: $(STAMP)training $(STAMP)bench
 policy: $(STAMP)training
 	$(RUN) training.search --tasks office:1 office:3 hybrid:1 --rounds 8 --pairs 30 --out runs/weights
 
-# The predictor of maps that comes with the library; a stopped run goes on. Dungeons are fetched.
+# The predictors of maps that come with the library; a stopped run goes on. Dungeons are fetched.
 predictor: $(STAMP)training
 	$(RUN) training.map_predictor --missions 90 --validation-missions 12 --epochs 26 --threads 1 --device cpu --out runs/map-predictor
+	$(RUN) training.map_predictor --recipes cave office-3d --missions 90 --validation-missions 12 --epochs 26 --device cpu --out runs/volumes
 
 reliability: $(STAMP)dev
 	$(RUN) benchmarks.proofs --full --out docs/results/reliability.md

@@ -3,6 +3,7 @@
     python -m training.map_predictor --out runs/map-predictor
     python -m training.map_predictor --leave-out office --out runs/without-office
     python -m training.map_predictor --weights runs/map-predictor/predictor.safetensors --out runs/again
+    python -m training.map_predictor --recipes cave office-3d --out runs/volumes
 
 Samples are cut from missions (`training.map_samples`), turned and mirrored at random. The loss is the log
 loss of the cells in which nothing was measured, and of no others; the weights that are kept are a moving
@@ -42,15 +43,17 @@ from baselines.cli.interruption import Interruption
 from baselines.cli.worker_options import WorkerOptions
 from entropy_explore_env.command import INTERRUPTED
 from entropy_explore_env.errors import SettingError, counted, one_of
-from entropy_explore_env.prediction.unet import LEVELS, layer_shapes
-from entropy_explore_env.prediction.weights import FEATURES, read_network
+from entropy_explore_env.prediction.unet import LEVELS, Form, layer_shapes
+from entropy_explore_env.prediction.weights import features_of, read_network
 from entropy_explore_env.settings.validation import check_whole
 from entropy_explore_env.version import VERSION
 from entropy_explore_env.writing import write_atomically
 from training.map_samples import (
+    PLAN_RECIPES,
     RECIPES,
     STEPS,
     Samples,
+    form_of,
     make_samples,
     read_samples,
     sampled_missions,
@@ -80,8 +83,9 @@ class Args(WorkerOptions):
         *("epochs", "batch", "rate", "seed", "threads", "device", "jobs", "cluster", "json"),
     )
 
-    recipes: tuple[str, ...] = RECIPES
-    """What worlds are learned from: office, corridor, cluttered, hybrid, dungeon."""
+    recipes: tuple[str, ...] = PLAN_RECIPES
+    """What worlds are learned from: office, corridor, cluttered, hybrid, dungeon; or the volumes cave,
+    office-3d."""
     leave_out: str | None = None
     """One of these recipes that is not learned from; the figures tell of it all the same."""
     out: Path = Path("runs/map-predictor")
@@ -115,7 +119,8 @@ def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
     check(args)
-    network = None if args.weights is None else read_network(args.weights)
+    form = form_of(args.recipes[0])
+    network = None if args.weights is None else read_network(args.weights, form)
     workers = args.workers
     make_folder("out", args.out)
     if network is None:
@@ -136,9 +141,9 @@ def main(words: Sequence[str]) -> int:
             model = train(args, samples, interruption)
             if model is None:
                 return _interrupted(args)
-            write_atomically(args.out / "predictor.safetensors", save(model.named(), FEATURES))
-            network = read_network(args.out / "predictor.safetensors")
-    predicted = predictions(network, validation[0])
+            write_atomically(args.out / "predictor.safetensors", save(model.named(), features_of(form)))
+            network = read_network(args.out / "predictor.safetensors", form)
+    predicted = predictions(network, form, validation[0])
     every_nth = max(len(samples.truth) // _NEAREST_SAMPLES, 1)
     shares = nearest_shares(Samples(*(values[::every_nth] for values in samples)))
     figures = figures_of(scored(*validation, predicted, shares))
@@ -163,6 +168,8 @@ def check(args: Args) -> None:
     for name in args.recipes:
         if name not in RECIPES:
             raise SettingError("recipes", name, one_of(name, RECIPES))
+    if len({form_of(name) for name in args.recipes}) > 1:
+        raise SettingError("recipes", args.recipes, "plans alone, or volumes alone")
     if args.leave_out is not None and args.leave_out not in args.recipes:
         raise SettingError("leave_out", args.leave_out, one_of(args.leave_out, args.recipes))
     if args.recipes == (args.leave_out,):
@@ -204,10 +211,10 @@ def _interrupted(args: Args) -> int:
 class UNet(nn.Module):
     """The network of `prediction.unet`, for learning."""
 
-    def __init__(self) -> None:
+    def __init__(self, form: Form) -> None:
         """Draw weights as PyTorch does."""
         super().__init__()
-        shapes = layer_shapes()
+        shapes = layer_shapes(form)
         self.first, self.second, self.lift, self.merge = (
             nn.ModuleList(
                 nn.Conv2d(inputs, outputs, math.isqrt(taps), padding=math.isqrt(taps) // 2)
@@ -220,7 +227,7 @@ class UNet(nn.Module):
         self.head = nn.Conv2d(inputs, outputs, 1)
 
     def forward(self, cells: torch.Tensor) -> torch.Tensor:
-        """Return the logits (B, C, C) of cells (B, 3, C, C)."""
+        """Return the logits (B, L, C, C) of cells (B, 2·L + 1, C, C)."""
         values, finer = functional.pixel_unshuffle(cells, 2), []
         for level in range(LEVELS):
             if level > 0:
@@ -231,7 +238,7 @@ class UNet(nn.Module):
         for level in range(LEVELS - 2, -1, -1):
             lifted = functional.interpolate(self.lift[level](values), scale_factor=2, mode="nearest")
             values = functional.relu(self.merge[level](finer[level] + lifted))
-        return functional.pixel_shuffle(self.head(values), 2)[:, 0]
+        return functional.pixel_shuffle(self.head(values), 2)
 
     def named(self) -> dict[str, torch.Tensor]:
         """Return the weights by name, each in memory of its own."""
@@ -239,7 +246,7 @@ class UNet(nn.Module):
 
 
 def masked_loss(logits: torch.Tensor, truth: torch.Tensor, asked: torch.Tensor) -> torch.Tensor:
-    """Return the mean log loss, nats, of the cells that are asked for; all (B, C, C)."""
+    """Return the mean log loss, nats, of the cells that are asked for; all (B, L, C, C)."""
     losses = functional.binary_cross_entropy_with_logits(logits, truth, reduction="none")
     return (losses * asked).sum() / asked.sum().clamp(min=1.0)
 
@@ -250,8 +257,8 @@ def drawn_batch(
     """Return channels, truth and what is asked for of some samples, all turned and mirrored in one way.
 
     Args:
-        cells: (N, 3, C, C) uint8 of all samples; like all tensors on the device for learning.
-        truth: (N, C, C) bool.
+        cells: (N, 2·L + 1, C, C) uint8 of all samples; like all tensors on the device for learning.
+        truth: (N, L, C, C) bool.
         chosen: (B,) int64, numbers of samples.
         rng: Draws turn and mirroring.
     """
@@ -277,7 +284,7 @@ def train(args: Args, samples: Samples, interruption: Interruption) -> UNet | No
     """Return a trained network, the moving average of its weights; None if Ctrl-C stopped that."""
     torch.set_num_threads(args.threads)
     torch.manual_seed(args.seed)
-    device, model = device_of(args), UNet()
+    device, model = device_of(args), UNet(form_of(args.recipes[0]))
     model.to(device, memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue] - twice as fast
     cells, truth = (torch.from_numpy(values).to(device) for values in samples)
     optimiser = torch.optim.AdamW(model.parameters(), lr=args.rate, weight_decay=_DECAY)
@@ -345,7 +352,9 @@ def _training_file(args: Args) -> Path:
 
 def _origin(args: Args) -> str:
     """Return the options that determine the weights, as JSON."""
-    return json.dumps({name: getattr(args, name) for name in _OPTIONS} | FEATURES)
+    return json.dumps(
+        {name: getattr(args, name) for name in _OPTIONS} | features_of(form_of(args.recipes[0]))
+    )
 
 
 def _taken_up(args: Args) -> tuple[int, dict[str, torch.Tensor]]:

@@ -23,11 +23,14 @@ from baselines.experiments.mission import run_mission, scripted_env
 from baselines.experiments.ray_cluster import RayCluster
 from baselines.experiments.worker_pool import Failure, run_each
 from baselines.strategies import make_strategy
+from baselines.suites.prediction import WITHOUT
 from baselines.suites.public_worlds import in_world
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.view import RobotView
-from entropy_explore_env.prediction.crop import OUTSIDE, SOLID, around, pool_crop
+from entropy_explore_env.prediction.crop import OUTSIDE, PLANS, SOLID, around, pool_crop
+from entropy_explore_env.prediction.unet import Form
+from entropy_explore_env.prediction.volumes import VOLUMES, VolumeWindow, pool_volume_crop
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import SCENARIOS
@@ -36,10 +39,13 @@ from training.checkpoints import stored_arrays, stored_bytes
 
 _Numbers = TypeVar("_Numbers", np.ndarray, torch.Tensor)
 
-RECIPES = ("office", "corridor", "cluttered", "hybrid", "dungeon")
+PLAN_RECIPES = ("office", "corridor", "cluttered", "hybrid", "dungeon")
+VOLUME_RECIPES = ("cave", "office-3d")
+RECIPES = PLAN_RECIPES + VOLUME_RECIPES
 """What worlds are sampled from."""
 SPLITS = ("train", "validation")
-STRATEGIES = ("planned-rate", "nearest-frontier", "distance-advantage", "per-time-visibility")
+STRATEGIES = (WITHOUT, "nearest-frontier", "distance-advantage", "per-time-visibility")
+"""The planner predicts nothing here: no weights depend on earlier ones."""
 _DUNGEONS = {"train": range(1, 81, 2), "validation": range(81, 101, 2)}
 """The dungeons of each split; those of even number are for tests."""
 _VOXELS_M = (0.1, 0.1, 0.2, 0.25)
@@ -77,9 +83,14 @@ class Samples(NamedTuple):
     """N samples of crops of C × C cells."""
 
     cells: np.ndarray
-    """(N, 3, C, C) uint8, the channels of a crop in steps of 1/252."""
+    """(N, 2·L + 1, C, C) uint8, the channels of a crop of L layers in steps of 1/252."""
     truth: np.ndarray
-    """(N, C, C) bool, which cells are solid."""
+    """(N, L, C, C) bool, which cells are solid; in a volume, in which cells the middle voxel is."""
+
+
+def form_of(recipe: str) -> Form:
+    """Return the form of a network that learns from a recipe."""
+    return VOLUMES if recipe in VOLUME_RECIPES else PLANS
 
 
 def sampled_missions(
@@ -100,6 +111,9 @@ def scenario_of(sampled: Sampled, rng: np.random.Generator) -> Scenario:
     if rng.random() < 0.5:
         changes["robot"] = {"redecide": "on_scan"}
         changes["sensor"]["scan_every_m"] = 1.0
+    if sampled.recipe in VOLUME_RECIPES:
+        alone = {name: changes[name] for name in ("robots", "split", "ending")}
+        return with_settings(SCENARIOS[sampled.recipe], alone)
     voxel_size_m, scale = float(rng.choice(_VOXELS_M)), float(rng.choice(_SCALES))
     if sampled.recipe == "dungeon":
         number = int(rng.choice(_DUNGEONS[sampled.split]))
@@ -138,14 +152,31 @@ def sample_mission(sampled: Sampled) -> bytes:
 
 
 def crop_and_truth(env: EntropyExploreEnv, view: RobotView) -> tuple[np.ndarray, np.ndarray]:
-    """Return the channels (3, C, C) around a robot and which cells (C, C) are solid in its true world."""
+    """Return the channels (2·L + 1, C, C) around a robot, and what is solid (L, C, C) in its true world."""
     world = env.missions.worlds[0]
     assert world is not None
     given = (view.scenario.sigma_prior, view.pose, view.kind.robot.body_radius_m)
-    cells = pool_crop(around(world.grid, view.mean, view.precision, *given))[0]
+    there = around(world.grid, view.mean, view.precision, *given)
+    if not world.grid.flat:
+        cells, window = pool_volume_crop(there)
+        return cells, _solid_cells(world.occupied, world.grid.voxel_size_m, window)
+    cells = pool_crop(there)[0]
     occupied, sure = world.occupied.astype(np.float32), np.full(world.grid.shape, 1e9, np.float32)
     truth = pool_crop(around(world.grid, occupied, sure, *given))[0]
-    return cells, (truth[SOLID] > 0.0) | (truth[OUTSIDE] > 0.0)
+    return cells, ((truth[SOLID] > 0.0) | (truth[OUTSIDE] > 0.0))[None]
+
+
+def _solid_cells(occupied: np.ndarray, voxel_size_m: float, window: VolumeWindow) -> np.ndarray:
+    """Return (L, C, C) bool, which cells of a crop have a solid voxel in the middle, or lie outside."""
+    counts = (VOLUMES.cells, VOLUMES.cells, VOLUMES.layers)
+    found, inside = [], []
+    for first, count, voxels in zip(window, counts, occupied.shape, strict=True):
+        middle_m = (first + np.arange(count) + 0.5) * VOLUMES.cell_m
+        at = np.floor(middle_m / voxel_size_m).astype(np.int64)
+        inside.append((at >= 0) & (at < voxels))
+        found.append(np.clip(at, 0, voxels - 1))
+    x, y, z = np.meshgrid(*inside, indexing="ij", sparse=True)
+    return np.moveaxis(occupied[np.ix_(*found)] | ~(x & y & z), 2, 0)
 
 
 def make_samples(
@@ -191,8 +222,19 @@ def read_samples(folder: Path, missions: Iterable[Sampled]) -> tuple[Samples, np
 
 
 def unmeasured(cells: _Numbers) -> _Numbers:
-    """Return (N, C, C) bool, the cells of a workspace in which nothing was measured, from (N, 3, C, C)."""
-    return (cells == 0).all(1)  # pyright: ignore[reportReturnType] - of arrays and of tensors alike
+    """Return (N, L, C, C) bool, the cells of a workspace in which nothing was measured, from channels."""
+    layers = cells.shape[1] // 2
+    nothing = (cells[:, :layers] == 0) & (cells[:, layers : 2 * layers] == 0)
+    return nothing & (cells[:, 2 * layers :] == 0)  # pyright: ignore[reportReturnType] - arrays and tensors
+
+
+def as_plans(samples: Samples) -> Samples:
+    """Return each layer of samples as a sample of one layer."""
+    layers = samples.truth.shape[1]
+    solid, free = samples.cells[:, :layers], samples.cells[:, layers : 2 * layers]
+    outside = np.broadcast_to(samples.cells[:, 2 * layers :], solid.shape)
+    cells = np.stack([solid, free, outside], axis=2).reshape(-1, 3, *solid.shape[2:])
+    return Samples(cells, samples.truth.reshape(-1, 1, *solid.shape[2:]))
 
 
 def as_channels(cells: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
 """How good predictions of maps are: log loss beside two baselines, calibration, and pictures to look at.
 
-Scores count the cells of a workspace in which nothing was measured, and nothing else. A log loss is in bits a
-cell,
+Scores count the cells of a workspace in which nothing was measured, and nothing else; of a volume, each layer
+counts as a sample. A log loss is in bits a cell,
 
     -mean(y log2 p + (1 - y) log2(1 - p)),
 
@@ -22,8 +22,8 @@ from scipy.ndimage import distance_transform_edt
 
 from entropy_explore_env.prediction.crop import CELL_M, OUTSIDE, SOLID
 from entropy_explore_env.prediction.predictor import new_predicting
-from entropy_explore_env.prediction.unet import Network, fill_unmeasured, infer
-from training.map_samples import RECIPES, Samples, as_channels, unmeasured
+from entropy_explore_env.prediction.unet import Form, Network, fill_unmeasured, infer
+from training.map_samples import RECIPES, Samples, as_channels, as_plans, unmeasured
 
 BINS = 10
 _EDGES_M = np.array([0.3, 0.5, 0.9, 1.7, 3.3, 6.5])
@@ -50,9 +50,9 @@ class Scored(NamedTuple):
     """(M,) number in RECIPES."""
 
 
-def predictions(network: Network, samples: Samples) -> np.ndarray:
-    """Return (N, C, C) float32, the probability that cells are solid; of measured cells it means nothing."""
-    predicting, found = new_predicting(network), np.empty(samples.truth.shape, np.float32)
+def predictions(network: Network, form: Form, samples: Samples) -> np.ndarray:
+    """Return (N, L, C, C) float32, the probability to be solid; of measured cells it means nothing."""
+    predicting, found = new_predicting(network, form), np.empty(samples.truth.shape, np.float32)
     for solid, cells in zip(found, samples.cells, strict=True):
         solid[:] = -1.0
         infer(network, predicting.planes, as_channels(cells))
@@ -78,10 +78,11 @@ def nearest_bins(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def nearest_shares(samples: Samples) -> np.ndarray:
     """Return (2·B,) float64, the share of solid cells of each bin of `nearest`."""
-    asked = unmeasured(samples.cells)
-    bins = nearest_bins(samples.cells)[0][asked]
+    plans = as_plans(samples)
+    asked = unmeasured(plans.cells)[:, 0]
+    bins = nearest_bins(plans.cells)[0][asked]
     size = 2 * len(_EDGES_M) + 2
-    solid = np.bincount(bins, samples.truth[asked], minlength=size)
+    solid = np.bincount(bins, plans.truth[:, 0][asked], minlength=size)
     return (solid + 1.0) / (np.bincount(bins, minlength=size) + 2.0)
 
 
@@ -91,13 +92,15 @@ def scored(samples: Samples, recipes: np.ndarray, predicted: np.ndarray, shares:
     Args:
         samples: N of validation.
         recipes: (N,) number in RECIPES of where each comes from.
-        predicted: (N, C, C) of a predictor.
+        predicted: (N, L, C, C) of a predictor.
         shares: Of `nearest_shares`.
     """
-    asked = unmeasured(samples.cells)
-    bins, near = nearest_bins(samples.cells)
-    where = np.broadcast_to(recipes[:, None, None], asked.shape)[asked]
-    return Scored(samples.truth[asked], predicted[asked], shares[bins[asked]], near[asked], where)
+    plans, layers = as_plans(samples), samples.truth.shape[1]
+    asked = unmeasured(plans.cells)[:, 0]
+    bins, near = nearest_bins(plans.cells)
+    where = np.broadcast_to(np.repeat(recipes, layers)[:, None, None], asked.shape)[asked]
+    truth, guess = plans.truth[:, 0], predicted.reshape(asked.shape)
+    return Scored(truth[asked], guess[asked], shares[bins[asked]], near[asked], where)
 
 
 def log_loss_bits(truth: np.ndarray, predicted: np.ndarray) -> float:
@@ -172,29 +175,31 @@ def draw_figure(
         file: Picture.
         samples: N of validation.
         recipes: (N,) number in RECIPES of where each comes from.
-        predicted: (N, C, C) of a predictor.
+        predicted: (N, L, C, C) of a predictor.
         figures: Of `figures_of`.
     """
     from matplotlib.figure import Figure
 
-    shown = [_half_seen(samples, np.flatnonzero(recipes == number)) for number in np.unique(recipes)]
+    plans, where = as_plans(samples), np.repeat(recipes, samples.truth.shape[1])
+    predicted = predicted.reshape(-1, *predicted.shape[2:])
+    shown = [_half_seen(plans, np.flatnonzero(where == number)) for number in np.unique(recipes)]
     figure = Figure(figsize=(2.4 * len(shown) + 3.4, 7.4), layout="constrained")
     left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=[2.4 * len(shown), 3.4])[0]
     panels: Any = left.subplots(3, len(shown), squeeze=False)
     for column, number in enumerate(shown):
-        cells, asked = samples.cells[number], unmeasured(samples.cells[[number]])[0]
+        cells, asked = plans.cells[number], unmeasured(plans.cells[[number]])[0, 0]
         known = np.where(cells[SOLID] > 0, 1.0, 0.0)
         known[cells[OUTSIDE] > 0] = 1.0
         maps = (
             np.where(asked, np.nan, known),
             np.where(asked, predicted[number], known),
-            samples.truth[number],
+            plans.truth[number, 0],
         )
         for row, (name, values) in enumerate(zip(("measured", "predicted", "true"), maps, strict=True)):
             panel = panels[row, column]
             panel.set_facecolor("#f2c879")  # what is unknown
             panel.imshow(np.asarray(values, float).T, origin="lower", cmap="gray_r", vmin=0.0, vmax=1.0)
-            panel.set(xticks=[], yticks=[], title=RECIPES[recipes[number]] if row == 0 else "")
+            panel.set(xticks=[], yticks=[], title=RECIPES[where[number]] if row == 0 else "")
             if column == 0:
                 panel.set_ylabel(name)
     diagram = right.subplots()
@@ -210,6 +215,10 @@ def draw_figure(
 
 
 def _half_seen(samples: Samples, those: np.ndarray) -> int:
-    """Return the sample of which the largest share is unmeasured, among those at most 0.4 of which are."""
-    shares = unmeasured(samples.cells[those]).mean(axis=(1, 2))
+    """Return the sample of which the largest share is unmeasured, among those at most 0.4 of which are.
+
+    Some of it is free: a layer of a volume may hold rock alone.
+    """
+    those = those[~samples.truth[those].all(axis=(1, 2, 3))]
+    shares = unmeasured(samples.cells[those]).mean(axis=(1, 2, 3))
     return int(those[np.argmax(np.where(shares <= 0.4, shares, -shares))])

@@ -1,8 +1,9 @@
 """What a predicted map brings the planner, beside one probability everywhere, and the true map.
 
-Ground robots in plans until their map is known, as the scenarios stand. The predictor has seen other worlds
-of the recipes, no plan like the warehouse, and of the dungeons those of odd number: here are the others,
-with robots that have no body. The bound knows what each unknown voxel is, but plans as the planner does.
+Ground robots in plans and flying ones in caves until their map is known, as the scenarios stand. The
+predictors have seen other worlds of the recipes, no plan like the warehouse, and of the dungeons those of odd
+number: here are the others, with robots that have no body. The bound knows what each unknown voxel is, but
+plans as the planner does.
 """
 
 from __future__ import annotations
@@ -35,6 +36,8 @@ TEAMS = (
     ("office", 1),
     ("office", 3),
     ("warehouse", 4),
+    ("cave", 1),
+    ("cave", 3),
 )
 QUICK_TEAMS = TEAMS[:1]
 MEASURES = (TIME, PATH)
@@ -44,6 +47,7 @@ GOALS: Mapping[str, float] = MappingProxyType(
     {
         **{team_name(name, robots): 0.90 for name in ("corridor", "hybrid") for robots in (1, 3)},
         **{team_name("office", 1): 0.88, team_name("office", 3): 0.85, DUNGEONS: 0.85},
+        team_name("cave", 3): 0.95,
     }
 )
 """Task → what the ratio of time was hoped to be at most."""
@@ -58,16 +62,20 @@ class Unpredicted(PlannedRate):
 
 
 class Constant(PlannedRate):
-    """The planner whose imagined rays stop in every unknown voxel with one probability, a high one."""
+    """The planner whose imagined rays stop in every unknown voxel with one probability, a high one.
 
-    STOPS = 0.3
+    Of those tried in caves of the training split, the one with which a team of three takes the least time.
+    """
+
+    IN_PLANS, IN_VOLUMES = 0.3, 0.85
 
     def __init__(self) -> None:
         """Take the same probability for all voxels."""
         super().__init__(foresight=lambda: self._solid)
 
     def _solid(self, view: RobotKnowledge) -> np.ndarray:
-        return np.full(view.precision.size, self.STOPS, np.float32)
+        stops = self.IN_PLANS if view.scenario.grid.flat else self.IN_VOLUMES
+        return np.full(view.precision.size, stops, np.float32)
 
 
 class TrueMap(PlannedRate):
@@ -139,7 +147,7 @@ def bounds_table(results: Results) -> str:
     head = ["task", "missions", "time (s) without"]
     for name in ("predicted", "true map"):
         head += [f"{name}: {measure.words.split()[0]}" for measure in MEASURES]
-    head += ["recipe left out: time", f"p = {Constant.STOPS}: time", "goal of time, met"]
+    head += ["recipe left out: time", "one probability: time", "goal of time, met"]
     rows = []
     for task in results.tasks:
         alone = results.values(task, WITHOUT, TIME)

@@ -1,7 +1,7 @@
 """What a planner expects of voxels that a robot never measured: a prediction in place of one probability.
 
 Imagined rays pass an unknown voxel with the same probability everywhere (`recipe`), so a robot expects to see
-into rock. Where most of what is unknown is predicted to be solid, they stop as predicted. Behind thin walls,
+into rock. Where much of what is unknown is predicted to be solid, they stop as predicted. Behind thin walls,
 as in offices, that brings nothing, even with the true map in place of the prediction.
 """
 
@@ -19,14 +19,15 @@ from entropy_explore_env.planner.thresholds import (
     RENEWED_DECISIONS,
     RENEWED_M,
     SOLID_SHARE,
+    SOLID_SHARE_IN_VOLUMES,
     TO_AND_FRO,
 )
-from entropy_explore_env.prediction.crop import ROUNDING
+from entropy_explore_env.prediction.crop import ROUNDING, UNPREDICTED
 from entropy_explore_env.prediction.predictor import Prediction, Predictor
 from entropy_explore_env.settings.grid import Grid
+from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.viewpoints.evaluation import sees_all_around
-from entropy_explore_env.viewpoints.expected_scan import UNPREDICTED
 
 Foresight = Callable[[RobotView], np.ndarray | None]
 """What one robot knows → (V,) float32, of each voxel that is unknown to it the probability to stop a ray, or
@@ -34,20 +35,27 @@ UNPREDICTED; what it says of known voxels does not count. None = nothing is pred
 
 
 def predictions_pay(scenario: Scenario) -> bool:
-    """Return whether predictions pay: for ground robots that see all around and decide at stops, in plans.
+    """Return whether predictions pay in missions that end when a map is known.
 
-    Missions that end when enough is seen took as long, even with the true map in place of the prediction;
-    robots that decide under way turned back too often.
+    They do for ground robots that see all around, in plans, and for flying ones with a narrow view on planned
+    paths, in volumes; for both where they decide at stops. Missions that end when enough is seen took as
+    long, even with the true map in place of the prediction; robots that decide under way turned back too
+    often.
     """
-    plans = scenario.grid.flat and not scenario.ending.by_seen
-    return plans and all(
-        kind.robot.motion == "planar" and kind.robot.redecide == "at_stop" and sees_all_around(kind.sensor)
-        for kind in scenario.kinds
-    )
+    return not scenario.ending.by_seen and all(_pay_for(scenario, kind) for kind in scenario.kinds)
+
+
+def _pay_for(scenario: Scenario, kind: RobotKind) -> bool:
+    robot, around = kind.robot, sees_all_around(kind.sensor)
+    if robot.redecide != "at_stop":
+        return False
+    if scenario.grid.flat:
+        return robot.motion == "planar" and around
+    return robot.motion == "free" and robot.navigator == "planned" and not around
 
 
 class LearnedForesight:
-    """What a predictor says of unknown voxels in a plan, in one mission; a Foresight.
+    """What a predictor says of unknown voxels, in one mission; a Foresight.
 
     A robot's prediction is renewed as it moves on, and after some decisions on one spot; at every decision it
     took twice the time, and brought nothing. A robot that drives to and fro goes on without predictions:
@@ -55,11 +63,11 @@ class LearnedForesight:
     """
 
     def __init__(self, predictor: Predictor | None = None) -> None:
-        """Begin a mission; without a predictor, take that of the library."""
+        """Begin a mission; without a predictor of plans, take that of the library."""
         self._predictor = predictor
         self._latest: dict[int, _Predicted] = {}
         self._courses: defaultdict[int, deque[np.ndarray]] = defaultdict(_new_course)
-        """Robot number → (2,) x, y of where it was at its last decisions."""
+        """Robot number → (3,) x, y, z of where it was at its last decisions."""
         self._without: set[int] = set()
         """Robots that go on without predictions."""
 
@@ -71,16 +79,21 @@ class LearnedForesight:
             return None
         latest = self._latest.get(view.robot)
         if latest is None or latest.voxels != view.precision.size or latest.is_old(view.pose):
-            predicted = view.prediction if self._predictor is None else view.predicted_by(self._predictor)
-            solid, place_m = _predicted_solid(view, predicted), view.pose[:2].copy()
+            solid, place_m = self._predicted(view), view.pose[:3].copy()
             latest = self._latest[view.robot] = _Predicted(place_m, view.precision.size, solid)
         latest.decisions += 1
         return latest.solid
 
+    def _predicted(self, view: RobotView) -> np.ndarray | None:
+        if not view.scenario.grid.flat:
+            return _solid_volume(view.predicted_volume)
+        predicted = view.prediction if self._predictor is None else view.predicted_by(self._predictor)
+        return _predicted_solid(view, predicted)
+
     def _goes_to_and_fro(self, view: RobotView) -> bool:
-        """Return whether a robot drove far in its last decisions, and stayed in a small part of the plan."""
+        """Return whether a robot drove far in its last decisions, and stayed in a small part of the world."""
         course = self._courses[view.robot]
-        course.append(view.pose[:2].copy())
+        course.append(view.pose[:3].copy())
         places_m = np.array(course)
         driven_m = np.linalg.norm(np.diff(places_m, axis=0), axis=1).sum()
         across_m = np.linalg.norm(places_m.max(axis=0) - places_m.min(axis=0))
@@ -97,7 +110,7 @@ class _Predicted:
     """What was predicted for a robot."""
 
     place_m: np.ndarray
-    """(2,) x, y of where it was."""
+    """(3,) x, y, z of where it was."""
     voxels: int
     """Of the grid then."""
     solid: np.ndarray | None
@@ -107,8 +120,14 @@ class _Predicted:
 
     def is_old(self, pose: np.ndarray) -> bool:
         """Return whether the robot, which is at a pose now, needs another one."""
-        moved_m = np.linalg.norm(pose[:2] - self.place_m)
+        moved_m = np.linalg.norm(pose[:3] - self.place_m)
         return bool(moved_m >= RENEWED_M or self.decisions >= RENEWED_DECISIONS)
+
+
+def _solid_volume(predicted: np.ndarray) -> np.ndarray | None:
+    """Return what a Foresight says by (X, Y, Z) `RobotView.predicted_volume`."""
+    held = predicted[predicted != UNPREDICTED]
+    return None if not len(held) or held.mean() < SOLID_SHARE_IN_VOLUMES else predicted.reshape(-1)
 
 
 def _predicted_solid(view: RobotView, prediction: Prediction) -> np.ndarray | None:

@@ -14,8 +14,9 @@ from entropy_explore_env.planner.candidate_features import CONTEXT, FEATURES
 from entropy_explore_env.planner.model import Proposer, new_proposers
 from entropy_explore_env.planner.records import CANDIDATE, EXPERIENCE, Kind
 from entropy_explore_env.planner.thresholds import NO_GAIN_BITS
+from entropy_explore_env.prediction.crop import UNPREDICTED
 from entropy_explore_env.settings.scenario import Scenario
-from entropy_explore_env.viewpoints.expected_scan import MOST_SCANS, UNPREDICTED, ScanScratch
+from entropy_explore_env.viewpoints.expected_scan import MOST_SCANS, ScanScratch
 
 
 class ViewProposer:

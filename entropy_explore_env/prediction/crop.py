@@ -15,12 +15,17 @@ import numpy as np
 
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.prediction.unet import Form
 from entropy_explore_env.settings.grid import Grid
 
 CELL_M = 0.2
 """Edge of a cell."""
 CELLS = 128
 """N, cells of a crop along x and along y: 25.6 m."""
+PLANS = Form(CELLS, 1, CELL_M, (16, 32, 64, 64))
+"""What a network for plans is."""
+UNPREDICTED = -1.0
+"""In place of a probability: nothing is predicted."""
 STEP = 16
 """Crops begin at multiples of this many cells."""
 CHANNELS = ("solid", "free", "outside")
@@ -71,13 +76,14 @@ def window_at(belief, place, radius):
     layers = belief.size[2]
     low = min(max(math.floor(place[2] - radius + ROUNDING), 0), layers - 1)
     high = min(max(math.floor(place[2] + radius - ROUNDING), low), layers - 1) + 1
-    return Window(_first_cell(belief, place[0]), _first_cell(belief, place[1]), low, high)
+    first = first_cell(belief, place[0], CELL_M, CELLS), first_cell(belief, place[1], CELL_M, CELLS)
+    return Window(first[0], first[1], low, high)
 
 
 @inlined_kernel
-def _first_cell(belief, at):
-    """Return where a crop around a coordinate in grid units begins."""
-    return math.floor(at * belief.voxel_size_m / (CELL_M * STEP) + 0.5) * STEP - CELLS // 2
+def first_cell(belief, at, cell_m, cells):
+    """Return where a crop of cells around a coordinate in grid units begins."""
+    return math.floor(at * belief.voxel_size_m / (cell_m * STEP) + 0.5) * STEP - cells // 2
 
 
 @inlined_kernel
@@ -87,15 +93,33 @@ def cell_at(belief, at):
 
 
 @inlined_kernel
-def _first_voxel(cell, per_cell):
-    """Return the first voxel along an axis that a cell overlaps."""
-    return math.floor((cell + ROUNDING) * per_cell)
+def overlapped(cell, per_cell, voxels):
+    """Return (first, last) of the `voxels` along an axis that a cell overlaps: from `first` up to `last`."""
+    first, last = math.floor((cell + ROUNDING) * per_cell), math.ceil((cell + 1 - ROUNDING) * per_cell)
+    return max(first, 0), min(last, voxels)
 
 
-@inlined_kernel
-def _last_voxel(cell, per_cell):
-    """Return the voxel along an axis after the last one that a cell overlaps."""
-    return math.ceil((cell + 1 - ROUNDING) * per_cell)
+@lean_kernel
+def count_measured(belief, x, y, z):
+    """Return what of a box of voxels was measured; x, y and z are (first, last) as of `overlapped`.
+
+    Returns:
+        (covered, free, most): numbers of voxels, and the largest expected coverage; -1 = none was measured.
+    """
+    threshold = np.float32(belief.prior_precision) * np.float32(1.0 + ROUNDING)
+    covered, free, most, size = 0, 0, np.float32(-1.0), belief.size
+    for i in range(x[0], x[1]):
+        for j in range(y[0], y[1]):
+            column = (i * size[1] + j) * size[2]
+            for voxel in range(column + z[0], column + z[1]):
+                if belief.precision[voxel] > threshold:
+                    mean = belief.mean[voxel]
+                    most = max(most, mean)
+                    if mean > _COVERED:
+                        covered += 1
+                    else:
+                        free += 1
+    return covered, free, most
 
 
 @lean_kernel
@@ -109,28 +133,13 @@ def pool_cells(belief, window, cells, solid):
         solid: (N, N) float32, filled in: expected coverage of the most covered voxel that was measured; -1
             where none was, 1 outside the workspace.
     """
-    per_cell = CELL_M / belief.voxel_size_m
-    threshold = np.float32(belief.prior_precision) * np.float32(1.0 + ROUNDING)
-    size = belief.size
+    per_cell, size, band = CELL_M / belief.voxel_size_m, belief.size, (window.low, window.high)
     for i in range(CELLS):
-        first_x = max(_first_voxel(window.x + i, per_cell), 0)
-        last_x = min(_last_voxel(window.x + i, per_cell), size[0])
+        x = overlapped(window.x + i, per_cell, size[0])
         for j in range(CELLS):
-            first_y = max(_first_voxel(window.y + j, per_cell), 0)
-            last_y = min(_last_voxel(window.y + j, per_cell), size[1])
-            covered, free, most = 0, 0, np.float32(-1.0)
-            for x in range(first_x, last_x):
-                for y in range(first_y, last_y):
-                    column = (x * size[1] + y) * size[2]
-                    for voxel in range(column + window.low, column + window.high):
-                        if belief.precision[voxel] > threshold:
-                            mean = belief.mean[voxel]
-                            most = max(most, mean)
-                            if mean > _COVERED:
-                                covered += 1
-                            else:
-                                free += 1
-            voxels = max(last_x - first_x, 0) * max(last_y - first_y, 0) * (window.high - window.low)
+            y = overlapped(window.y + j, per_cell, size[1])
+            covered, free, most = count_measured(belief, x, y, band)
+            voxels = max(x[1] - x[0], 0) * max(y[1] - y[0], 0) * (band[1] - band[0])
             outside = voxels == 0
             cells[SOLID, i, j] = 0.0 if outside else covered / voxels
             cells[FREE, i, j] = 0.0 if outside else free / voxels

@@ -19,7 +19,7 @@ from entropy_explore_env.compilation.kernels import lean_kernel
 from entropy_explore_env.prediction.crop import (
     CELL_M,
     CELLS,
-    CHANNELS,
+    PLANS,
     ROUNDING,
     Window,
     around,
@@ -28,8 +28,7 @@ from entropy_explore_env.prediction.crop import (
 )
 from entropy_explore_env.prediction.unet import (
     LEVELS,
-    SIDE,
-    WIDTHS,
+    Form,
     Network,
     Planes,
     fill_unmeasured,
@@ -47,22 +46,23 @@ class Predicting(NamedTuple):
     network: Network
     planes: Planes
     cells: np.ndarray
-    """(3, N, N) float32, scratch."""
+    """(2·L + 1, N, N) float32, scratch."""
     solid: np.ndarray
-    """(N, N) float32, filled in: probability of each cell to be solid."""
+    """(L, N, N) float32, filled in: probability of each cell to be solid."""
 
 
-def new_predicting(network: Network) -> Predicting:
-    """Return memory for the predictions of one thread."""
-    cells = np.zeros((len(CHANNELS), CELLS, CELLS), np.float32)
-    return Predicting(network, new_planes(), cells, np.zeros((CELLS, CELLS), np.float32))
+def new_predicting(network: Network, form: Form = PLANS) -> Predicting:
+    """Return memory for the predictions of one thread by a network of a form."""
+    cells = np.zeros((form.channels, form.cells, form.cells), np.float32)
+    solid = np.zeros((form.layers, form.cells, form.cells), np.float32)
+    return Predicting(network, new_planes(form), cells, solid)
 
 
 def scratch_bytes() -> int:
-    """Return about the bytes that the predictions of one thread need."""
-    sides = [(SIDE >> level) + 2 for level in range(LEVELS)]
-    planes = sum(4 * width * side**2 for width, side in zip(WIDTHS, sides, strict=True))
-    return 4 * planes + 4 * (len(CHANNELS) + 1) * CELLS**2
+    """Return about the bytes that the predictions of one thread need in observations."""
+    sides = [(PLANS.side >> level) + 2 for level in range(LEVELS)]
+    planes = sum(4 * width * side**2 for width, side in zip(PLANS.widths, sides, strict=True))
+    return 4 * planes + 4 * (PLANS.channels + 1) * CELLS**2
 
 
 @lean_kernel
@@ -73,7 +73,7 @@ def predict_cells(predicting, belief, place, radius):
         The Window of the crop.
     """
     window = window_at(belief, place, radius)
-    pool_cells(belief, window, predicting.cells, predicting.solid)
+    pool_cells(belief, window, predicting.cells, predicting.solid[0])
     infer(predicting.network, predicting.planes, predicting.cells)
     fill_unmeasured(predicting.planes, predicting.solid)
     return window
@@ -148,9 +148,10 @@ class Predictor:
         window = Window(*predict_cells(predicting, there.belief, there.place, there.radius))
         measured = predicting.cells[:2].max(axis=0) > 0.0
         origin_m = np.asarray(grid.origin_m)[:2] + CELL_M * np.array([window.x, window.y])
-        for array in (predicting.solid, measured, origin_m):
+        solid = predicting.solid[0]
+        for array in (solid, measured, origin_m):
             array.setflags(write=False)
-        return Prediction(predicting.solid, measured, origin_m, CELL_M, (window.low, window.high))
+        return Prediction(solid, measured, origin_m, CELL_M, (window.low, window.high))
 
 
 def read_predictor(file: Path) -> Predictor:

@@ -1,10 +1,10 @@
 """A U-Net (Ronneberger et al., MICCAI 2015) as kernels over planes of numbers, in single precision.
 
-Of a crop of N × N cells, blocks of 2 × 2 become channels (Shi et al., CVPR 2016), so that the finest of the
-four levels has side N/2. At each level two 3 × 3 convolutions, then the largest of 2 × 2 goes a level down.
-On the way up, a 1 × 1 convolution of the coarser level, each number repeated 2 × 2 times, is added to the
-finer one, and a 3 × 3 convolution follows. A last 1 × 1 convolution gives four logits a block. The 3 × 3
-convolutions end in max(0, ·); beyond the border is 0.
+Of a crop of N × N cells in L layers, blocks of 2 × 2 become channels (Shi et al., CVPR 2016), so that the
+finest of the four levels has side N/2. At each level two 3 × 3 convolutions, then the largest of 2 × 2 goes
+a level down. On the way up, a 1 × 1 convolution of the coarser level, each number repeated 2 × 2 times, is
+added to the finer one, and a 3 × 3 convolution follows. A last 1 × 1 convolution gives four logits a block
+for each layer. The 3 × 3 convolutions end in max(0, ·); beyond the border is 0.
 
 A plane of a level with side s is (s + 2)² numbers, row by row with a border of zeros. A convolution runs over
 all rows as one: its inner loop is long and nothing in it is summed up across the loop, so that a compiler
@@ -19,15 +19,33 @@ from typing import NamedTuple
 import numpy as np
 
 from entropy_explore_env.compilation.kernels import lean_kernel
-from entropy_explore_env.prediction.crop import CELLS, CHANNELS
 
-WIDTHS = (16, 32, 64, 64)
-"""Channels of each level, the finest first."""
-LEVELS = len(WIDTHS)
+LEVELS = 4
 BLOCK = 4
-"""Cells of a block."""
-SIDE = CELLS // 2
-"""Side of the finest level."""
+"""Cells of a block in one layer."""
+
+
+class Form(NamedTuple):
+    """What a network sees and says, and how large it is."""
+
+    cells: int
+    """N, cells of a crop along x and along y."""
+    layers: int
+    """L, layers of cells."""
+    cell_m: float
+    """Edge of a cell."""
+    widths: tuple[int, int, int, int]
+    """Channels of each level, the finest first."""
+
+    @property
+    def channels(self) -> int:
+        """What is told of a crop: shares measured solid and free in each layer, and what is outside."""
+        return 2 * self.layers + 1
+
+    @property
+    def side(self) -> int:
+        """Side of the finest level."""
+        return self.cells // 2
 
 
 class Layer(NamedTuple):
@@ -53,21 +71,21 @@ class Network(NamedTuple):
     head: Layer
 
 
-def layer_shapes() -> dict[str, tuple[int, int, int]]:
+def layer_shapes(form: Form) -> dict[str, tuple[int, int, int]]:
     """Return (O, I, K) of each layer, by its name: the field of Network, and its number in it."""
-    inputs = (BLOCK * len(CHANNELS), *WIDTHS[:-1])
-    shapes = {f"first.{level}": (WIDTHS[level], inputs[level], 9) for level in range(LEVELS)}
-    shapes |= {f"second.{level}": (WIDTHS[level], WIDTHS[level], 9) for level in range(LEVELS)}
-    shapes |= {f"lift.{level}": (WIDTHS[level], WIDTHS[level + 1], 1) for level in range(LEVELS - 1)}
-    shapes |= {f"merge.{level}": (WIDTHS[level], WIDTHS[level], 9) for level in range(LEVELS - 1)}
-    return shapes | {"head": (BLOCK, WIDTHS[0], 1)}
+    widths, inputs = form.widths, (BLOCK * form.channels, *form.widths[:-1])
+    shapes = {f"first.{level}": (widths[level], inputs[level], 9) for level in range(LEVELS)}
+    shapes |= {f"second.{level}": (widths[level], widths[level], 9) for level in range(LEVELS)}
+    shapes |= {f"lift.{level}": (widths[level], widths[level + 1], 1) for level in range(LEVELS - 1)}
+    shapes |= {f"merge.{level}": (widths[level], widths[level], 9) for level in range(LEVELS - 1)}
+    return shapes | {"head": (BLOCK * form.layers, widths[0], 1)}
 
 
 class Planes(NamedTuple):
     """Scratch memory: nothing in it is read before it is written, but for the zeros around planes."""
 
     blocks: np.ndarray
-    """(4·3, P) float32, the crop as channels."""
+    """(4·(2·L + 1), P) float32, the crop as channels."""
     below: tuple[np.ndarray, ...]
     """Of each level but the finest, its input (I, P)."""
     inner: tuple[np.ndarray, ...]
@@ -77,20 +95,20 @@ class Planes(NamedTuple):
     lifted: tuple[np.ndarray, ...]
     """Of each level but the coarsest, (O, P of the level below) on the way up."""
     logits: np.ndarray
-    """(4, P) float32."""
+    """(4·L, P) float32."""
 
 
-def new_planes() -> Planes:
+def new_planes(form: Form) -> Planes:
     """Return scratch memory for one crop."""
-    sizes = [((SIDE >> level) + 2) ** 2 for level in range(LEVELS)]
-    each, upper = range(LEVELS), range(LEVELS - 1)
+    sizes = [((form.side >> level) + 2) ** 2 for level in range(LEVELS)]
+    each, upper, widths = range(LEVELS), range(LEVELS - 1), form.widths
     return Planes(
-        blocks=np.zeros((BLOCK * len(CHANNELS), sizes[0]), np.float32),
-        below=tuple(np.zeros((WIDTHS[level], sizes[level + 1]), np.float32) for level in upper),
-        inner=tuple(np.zeros((WIDTHS[level], sizes[level]), np.float32) for level in each),
-        outer=tuple(np.zeros((WIDTHS[level], sizes[level]), np.float32) for level in each),
-        lifted=tuple(np.zeros((WIDTHS[level], sizes[level + 1]), np.float32) for level in upper),
-        logits=np.zeros((BLOCK, sizes[0]), np.float32),
+        blocks=np.zeros((BLOCK * form.channels, sizes[0]), np.float32),
+        below=tuple(np.zeros((widths[level], sizes[level + 1]), np.float32) for level in upper),
+        inner=tuple(np.zeros((widths[level], sizes[level]), np.float32) for level in each),
+        outer=tuple(np.zeros((widths[level], sizes[level]), np.float32) for level in each),
+        lifted=tuple(np.zeros((widths[level], sizes[level + 1]), np.float32) for level in upper),
+        logits=np.zeros((BLOCK * form.layers, sizes[0]), np.float32),
     )
 
 
@@ -101,18 +119,19 @@ def infer(network, planes, cells):
     Args:
         network: Network.
         planes: Planes; changed in place.
-        cells: (3, N, N) float32.
+        cells: (2·L + 1, N, N) float32.
     """
+    finest = cells.shape[1] // 2
     fill_blocks(cells, planes.blocks)
-    convolve(planes.blocks, network.first[0], SIDE, planes.inner[0])
-    convolve(planes.inner[0], network.second[0], SIDE, planes.outer[0])
+    convolve(planes.blocks, network.first[0], finest, planes.inner[0])
+    convolve(planes.inner[0], network.second[0], finest, planes.outer[0])
     for level in range(1, LEVELS):
-        side = SIDE >> level
+        side = finest >> level
         pool_largest(planes.outer[level - 1], side, planes.below[level - 1])
         convolve(planes.below[level - 1], network.first[level], side, planes.inner[level])
         convolve(planes.inner[level], network.second[level], side, planes.outer[level])
     for level in range(LEVELS - 2, -1, -1):
-        side = SIDE >> level
+        side = finest >> level
         mix(planes.outer[level + 1], network.lift[level], planes.lifted[level])
         add_repeated(planes.lifted[level], planes.outer[level], side, planes.inner[level])
         convolve(planes.inner[level], network.merge[level], side, planes.outer[level])
@@ -122,13 +141,14 @@ def infer(network, planes, cells):
 @lean_kernel
 def fill_blocks(cells, blocks):
     """Fill in the planes (4·C, P) of blocks of 2 × 2 cells, from cells (C, N, N)."""
+    side = cells.shape[1] // 2
     for channel in range(len(cells)):
         for part in range(BLOCK):
             plane = blocks[BLOCK * channel + part]
-            for i in range(SIDE):
-                row = plane[(i + 1) * (SIDE + 2) + 1 : (i + 2) * (SIDE + 2) - 1]
+            for i in range(side):
+                row = plane[(i + 1) * (side + 2) + 1 : (i + 2) * (side + 2) - 1]
                 source = cells[channel, 2 * i + part // 2]
-                for j in range(SIDE):
+                for j in range(side):
                     row[j] = source[2 * j + part % 2]
 
 
@@ -203,10 +223,13 @@ def add_repeated(coarse, fine, side, out):
 
 @lean_kernel
 def fill_unmeasured(planes, solid):
-    """Fill in the probability to be solid wherever (N, N) `solid` is below 0: what is measured stays."""
-    for i in range(CELLS):
-        for j in range(CELLS):
-            if solid[i, j] < 0.0:
-                part = 2 * (i % 2) + j % 2
-                logit = planes.logits[part, (i // 2 + 1) * (SIDE + 2) + j // 2 + 1]
-                solid[i, j] = 1.0 / (1.0 + math.exp(-np.float64(logit)))
+    """Fill in the probability to be solid wherever (L, N, N) `solid` is below 0: what is measured stays."""
+    layers, cells, _ = solid.shape
+    stride = cells // 2 + 2
+    for layer in range(layers):
+        for i in range(cells):
+            for j in range(cells):
+                if solid[layer, i, j] < 0.0:
+                    part = BLOCK * layer + 2 * (i % 2) + j % 2
+                    logit = planes.logits[part, (i // 2 + 1) * stride + j // 2 + 1]
+                    solid[layer, i, j] = 1.0 / (1.0 + math.exp(-np.float64(logit)))

@@ -14,28 +14,33 @@ from typing import Any
 import numpy as np
 
 from entropy_explore_env.errors import SettingError
-from entropy_explore_env.prediction.crop import CELL_M, CELLS, CHANNELS
-from entropy_explore_env.prediction.unet import LEVELS, Layer, Network, layer_shapes
+from entropy_explore_env.prediction.crop import CHANNELS, PLANS
+from entropy_explore_env.prediction.unet import LEVELS, Form, Layer, Network, layer_shapes
 
-SHIPPED = Path(__file__).parent / "learned" / "plans.safetensors"
-"""The weights that come with the library."""
-FEATURES = {"cell_m": f"{CELL_M:g}", "cells": f"{CELLS}", "channels": " ".join(CHANNELS)}
-"""What a file says of the crops that it was trained on."""
+LEARNED = Path(__file__).parent / "learned"
+SHIPPED = LEARNED / "plans.safetensors"
+"""The weights that come with the library, for plans."""
 _MOST_BYTES = 1 << 24
 _MOST_HEADER = 1 << 16
 _WROTE = "a file that training.map_predictor wrote"
 
 
-def read_network(file: Path) -> Network:
-    """Read a file of weights.
+def features_of(form: Form) -> dict[str, str]:
+    """Return what a file says of the crops that it was trained on."""
+    features = {"cell_m": f"{form.cell_m:g}", "cells": f"{form.cells}", "channels": " ".join(CHANNELS)}
+    return {**features, "layers": f"{form.layers}"}
+
+
+def read_network(file: Path, form: Form = PLANS) -> Network:
+    """Read a file of weights of a network of a form.
 
     Raises:
         SettingError: The file cannot be read, is truncated or of another format, was trained on other cells,
             channels or layers, or holds a number that is not finite.
     """
     header, content = _header_and_content(file)
-    _check_features(file, header.pop("__metadata__", None))
-    expected = _tensor_shapes()
+    _check_features(file, header.pop("__metadata__", None), form)
+    expected = _tensor_shapes(form)
     if strange := next((name for name in header if name not in expected), None):
         raise SettingError(f"weights in {file}", strange, "only the layers of this library's network")
     tensors = {name: _tensor(file, header.get(name), content, name, expected[name]) for name in expected}
@@ -43,7 +48,7 @@ def read_network(file: Path) -> Network:
         raise SettingError(f"weights in {file}", f"{len(content)} bytes of numbers", _WROTE)
     layers = {
         name: Layer(tensors[f"{name}.weight"].reshape(shape), tensors[f"{name}.bias"])
-        for name, shape in layer_shapes().items()
+        for name, shape in layer_shapes(form).items()
     }
     return Network(
         first=tuple(layers[f"first.{level}"] for level in range(LEVELS)),
@@ -54,10 +59,10 @@ def read_network(file: Path) -> Network:
     )
 
 
-def _tensor_shapes() -> dict[str, tuple[int, ...]]:
+def _tensor_shapes(form: Form) -> dict[str, tuple[int, ...]]:
     """Return the shape of each tensor of a file, by its name: weights as PyTorch has them, and biases."""
     shapes: dict[str, tuple[int, ...]] = {}
-    for name, (outputs, inputs, taps) in layer_shapes().items():
+    for name, (outputs, inputs, taps) in layer_shapes(form).items():
         edge = math.isqrt(taps)
         shapes[f"{name}.weight"] = (outputs, inputs, edge, edge)
         shapes[f"{name}.bias"] = (outputs,)
@@ -83,12 +88,13 @@ def _header_and_content(file: Path) -> tuple[dict[str, Any], bytes]:
     return header, content[8 + length :]
 
 
-def _check_features(file: Path, said: object) -> None:
+def _check_features(file: Path, said: object, form: Form) -> None:
     """Check that the weights were trained on the crops that this library makes."""
     if not isinstance(said, dict):
         raise SettingError(f"weights in {file}", "no metadata", _WROTE)
-    for name, ours in FEATURES.items():
-        if said.get(name) != ours:
+    theirs = {"layers": "1", **said}
+    for name, ours in features_of(form).items():
+        if theirs.get(name) != ours:
             allowed = f"{ours!r}: these weights are of other crops than this library's"
             raise SettingError(f"{file}: {name}", said.get(name), allowed)
 

@@ -11,7 +11,9 @@ from functools import cached_property
 
 import numpy as np
 
+from entropy_explore_env.prediction.crop import around
 from entropy_explore_env.prediction.predictor import Prediction, Predictor, shipped_predictor
+from entropy_explore_env.prediction.volumes import VolumePredictor, shipped_volume_predictor
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
@@ -145,6 +147,23 @@ class RobotKnowledge:
         grid, radius_m = self.scenario.grid, self.kind.robot.body_radius_m
         known = (self.mean, self.precision, self.scenario.sigma_prior)
         return predictor.predict(grid, *known, self.pose, radius_m)
+
+    @cached_property
+    def predicted_volume(self) -> np.ndarray:
+        """What is predicted of the voxels around the robot, as of the first look at it.
+
+        (X, Y, Z) float32, read-only: the probability to be solid, by the predictor of volumes that comes with
+        the library; `prediction.crop.UNPREDICTED` of voxels that were measured or are farther away.
+
+        Raises:
+            SettingError: The map holds a number that is not finite.
+        """
+        return self.volume_predicted_by(shipped_volume_predictor())
+
+    def volume_predicted_by(self, predictor: VolumePredictor) -> np.ndarray:
+        """Return what a predictor says of the voxels around the robot: see `predicted_volume`."""
+        given = (self.mean, self.precision, self.scenario.sigma_prior)
+        return predictor.predict(around(self.scenario.grid, *given, self.pose, 0.0))
 
     @property
     def planar(self) -> bool:

@@ -31,10 +31,9 @@ from entropy_explore_env.belief.measurement_model import measurement_precision
 from entropy_explore_env.belief.raycast import OPEN, OPEN_END, STOP_AT_COVERED, Crossing, Line, cast_ray
 from entropy_explore_env.belief.voxel_index import grid_index
 from entropy_explore_env.compilation.kernels import inlined_kernel, lean_kernel
+from entropy_explore_env.prediction.crop import UNPREDICTED
 
 MOST_SCANS, _DOUBLINGS = 8, 3
-UNPREDICTED = -1.0
-"""In place of a probability: nothing is predicted of a voxel."""
 _LEAST_SHARE = 1e-3
 """Rays that get on with less probability are not followed."""
 _LEAST_GAIN = 1e-45

@@ -17,11 +17,13 @@ from entropy_explore_env.planner.thresholds import (
     RENEWED_DECISIONS,
     RENEWED_M,
     SOLID_SHARE,
+    SOLID_SHARE_IN_VOLUMES,
 )
+from entropy_explore_env.prediction.crop import UNPREDICTED
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import SCENARIOS
-from entropy_explore_env.viewpoints.expected_scan import MOST_SCANS, UNPREDICTED, new_scan_scratch
+from entropy_explore_env.viewpoints.expected_scan import MOST_SCANS, new_scan_scratch
 
 SHAPE, PRIOR = (7, 11, 1), 0.25
 
@@ -117,8 +119,13 @@ def test_a_prediction_that_holds_no_centre_says_nothing():
         ("office", {"robots": 3}, True),
         ("office", {"ending": {"seen_share": 1.0}}, False),
         ("room", {}, False),
-        ("cave", {}, False),
-        ("office-3d", {}, False),
+        ("cave", {}, True),
+        ("cave", {"robots": 3}, True),
+        ("cave", {"ending": {"seen_share": 0.5}}, False),
+        ("cave", {"robot": {"navigator": "straight"}}, False),
+        ("cave", {"sensor": {"field_of_view_rad": (6.28, 1.0)}}, False),
+        ("office-3d", {}, True),
+        ("lab", {}, False),
         ("office-mixed", {}, False),
         ("corridor", {"robot": {"redecide": "on_scan"}, "sensor": {"scan_every_m": 1.0}}, False),
         ("corridor", {"robot": {"redecide": 0.5}}, False),
@@ -127,6 +134,21 @@ def test_a_prediction_that_holds_no_centre_says_nothing():
 )
 def test_missions_in_which_predictions_pay(name, changes, pays):
     assert predictions_pay(with_settings(SCENARIOS[name], changes)) == pays
+
+
+def test_a_volume_is_predicted_where_much_of_it_is_solid():
+    """As the view says, as it is; what nothing is said of does not count."""
+    predicted = np.full((3, 4, 5), UNPREDICTED, np.float32)
+    predicted[0], predicted[1] = SOLID_SHARE_IN_VOLUMES + 0.1, SOLID_SHARE_IN_VOLUMES - 0.05
+    view = view_of(None, shape=predicted.shape)
+    for change, heeded in ((0.0, True), (0.1, False)):
+        predicted[0] -= change
+        view.predicted_volume = predicted
+        found = LearnedForesight()(view)
+        assert (found is not None) == heeded
+        assert found is None or np.array_equal(found, predicted.reshape(-1))
+    view.predicted_volume = np.full(predicted.shape, UNPREDICTED, np.float32)
+    assert LearnedForesight()(view) is None
 
 
 def test_several_scans_count_where_something_is_predicted():
@@ -159,13 +181,13 @@ def goals_of(strategy, scenario):
     return np.array(goals)
 
 
-def test_the_planner_heeds_predictions_in_corridors_alone(monkeypatch):
+@pytest.mark.parametrize(("rock", "rooms"), [("corridor", "office"), ("cave", "office-3d")])
+def test_the_planner_heeds_predictions_in_rock_alone(rock, rooms, monkeypatch):
     """In offices, and where nothing is predicted, its goals are those of the planner without predictions."""
-    corridor = with_settings(SCENARIOS["corridor"], {"split": "validation"})
-    office = with_settings(SCENARIOS["office"], {"split": "validation", "robots": 1})
-    assert not np.array_equal(
-        goals_of(PlannedRate(), corridor), goals_of(PlannedRate(foresight=None), corridor)
-    )
-    assert np.array_equal(goals_of(PlannedRate(), office), goals_of(PlannedRate(foresight=None), office))
-    monkeypatch.setattr(foresight, "SOLID_SHARE", 1.1)
-    assert np.array_equal(goals_of(PlannedRate(), corridor), goals_of(PlannedRate(foresight=None), corridor))
+    changes = {"split": "validation", "robots": 1}
+    rock, rooms = (with_settings(SCENARIOS[name], changes) for name in (rock, rooms))
+    assert not np.array_equal(goals_of(PlannedRate(), rock), goals_of(PlannedRate(foresight=None), rock))
+    assert np.array_equal(goals_of(PlannedRate(), rooms), goals_of(PlannedRate(foresight=None), rooms))
+    for share in ("SOLID_SHARE", "SOLID_SHARE_IN_VOLUMES"):
+        monkeypatch.setattr(foresight, share, 1.1)
+    assert np.array_equal(goals_of(PlannedRate(), rock), goals_of(PlannedRate(foresight=None), rock))

@@ -9,14 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.prediction.unet import layer_shapes
-from entropy_explore_env.prediction.weights import FEATURES
+from entropy_explore_env.prediction.crop import PLANS
+from entropy_explore_env.prediction.unet import Form, layer_shapes
+from entropy_explore_env.prediction.weights import features_of
+
+FEATURES = features_of(PLANS)
 
 
-def random_tensors(seed: int = 0) -> dict[str, np.ndarray]:
+def random_tensors(seed: int = 0, form: Form = PLANS) -> dict[str, np.ndarray]:
     """Weights and biases by their names in files, such that activations neither vanish nor grow."""
     rng, tensors = np.random.default_rng(seed), {}
-    for name, (outputs, inputs, taps) in layer_shapes().items():
+    for name, (outputs, inputs, taps) in layer_shapes(form).items():
         edge = 3 if taps == 9 else 1
         scale = (2.0 / (inputs * taps)) ** 0.5
         weights = scale * rng.standard_normal((outputs, inputs, edge, edge))

@@ -32,7 +32,7 @@ def test_a_prediction_is_that_of_the_references(predictor):
     assert found.origin_m == pytest.approx(grid.origin_m[:2] + 0.2 * np.array(first))
     assert found.cell_m == 0.2 and found.layers == (0, 1)
     cells, solid = reference.channels(mean, measured, Fraction(1, 10), first, range(1))
-    expected = 1.0 / (1.0 + np.exp(-reference.logits(random_tensors(), cells)))
+    expected = 1.0 / (1.0 + np.exp(-reference.logits(random_tensors(), cells)[0]))
     assert np.array_equal(found.measured, cells[:2].max(axis=0) > 0)
     np.testing.assert_allclose(found.solid, np.where(solid < 0.0, expected, solid), atol=2e-4)
     assert 0.1 < found.measured.mean() < 0.9

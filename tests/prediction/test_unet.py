@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from entropy_explore_env.prediction.crop import PLANS
 from entropy_explore_env.prediction.predictor import new_predicting
 from entropy_explore_env.prediction.unet import Layer, convolve, fill_unmeasured, infer, new_planes
 from entropy_explore_env.prediction.weights import read_network
@@ -39,7 +40,7 @@ def logits(network, cells) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(2))
 def test_logits_are_those_of_numpy(network, seed):
     cells = drawn_cells(seed)
-    expected = reference.logits(random_tensors(), cells)
+    expected = reference.logits(random_tensors(), cells)[0]
     assert expected.std() > 0.3
     np.testing.assert_allclose(logits(network, cells), expected, atol=2e-4 * np.abs(expected).max())
 
@@ -48,16 +49,16 @@ def test_logits_are_those_of_pytorch(network):
     torch = pytest.importorskip("torch")
     from training.map_predictor import UNet
 
-    model = UNet()
+    model = UNet(PLANS)
     model.load_state_dict({name: torch.from_numpy(each) for name, each in random_tensors().items()})
     cells = drawn_cells(5)
     with torch.no_grad():
-        expected = model(torch.from_numpy(cells)[None])[0].numpy()
+        expected = model(torch.from_numpy(cells)[None])[0, 0].numpy()
     np.testing.assert_allclose(logits(network, cells), expected, atol=2e-4 * np.abs(expected).max())
 
 
 def test_memory_of_earlier_crops_changes_no_bit(network):
-    used, planes = new_predicting(network), new_planes()
+    used, planes = new_predicting(network), new_planes(PLANS)
     for seed in range(3):
         infer(network, used.planes, drawn_cells(seed))
     infer(network, planes, drawn_cells(2))
@@ -83,7 +84,7 @@ def test_only_what_was_not_measured_is_predicted(network):
     infer(network, predicting.planes, drawn_cells(4))
     solid = np.where(drawn_cells(9)[0] > 0.0, -1.0, 0.125).astype(np.float32)
     before = solid.copy()
-    fill_unmeasured(predicting.planes, solid)
+    fill_unmeasured(predicting.planes, solid[None])
     assert (solid[before >= 0.0] == 0.125).all()
     expected = 1.0 / (1.0 + np.exp(-logits(network, drawn_cells(4)).astype(float)))
     np.testing.assert_allclose(solid[before < 0.0], expected[before < 0.0], rtol=1e-6)

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from entropy_explore_env.errors import SettingError
+from entropy_explore_env.prediction.crop import PLANS
 from entropy_explore_env.prediction.predictor import read_predictor, shipped_predictor
 from entropy_explore_env.prediction.unet import layer_shapes
-from entropy_explore_env.prediction.weights import FEATURES, SHIPPED, read_network
-from tests.prediction.networks import file_bytes, random_tensors, written
+from entropy_explore_env.prediction.volumes import SHIPPED_VOLUMES, VOLUMES, shipped_volume_predictor
+from entropy_explore_env.prediction.weights import SHIPPED, features_of, read_network
+from tests.prediction.networks import FEATURES, file_bytes, random_tensors, written
 
 
 def test_numbers_are_those_written(tmp_path):
@@ -30,9 +32,25 @@ def test_the_file_is_that_of_the_safetensors_package(tmp_path):
 
 
 def test_the_shipped_weights_are_small_and_read_once():
-    weights = sum(outputs * inputs * taps + outputs for outputs, inputs, taps in layer_shapes().values())
-    assert weights <= 700_000 and SHIPPED.stat().st_size < 3 * 2**20
+    for form, file in ((PLANS, SHIPPED), (VOLUMES, SHIPPED_VOLUMES)):
+        shapes = layer_shapes(form).values()
+        assert sum(outputs * inputs * taps + outputs for outputs, inputs, taps in shapes) <= 700_000
+        assert file.stat().st_size < 3 * 2**20
     assert shipped_predictor() is shipped_predictor()
+    assert shipped_volume_predictor() is shipped_volume_predictor()
+
+
+def test_weights_are_those_of_one_form(tmp_path):
+    """A file of plans says nothing of layers if an earlier version wrote it."""
+    earlier = {name: said for name, said in FEATURES.items() if name != "layers"}
+    plans = written(tmp_path / "plans", file_bytes(random_tensors(), earlier))
+    volumes = written(tmp_path / "volumes", file_bytes(random_tensors(form=VOLUMES), features_of(VOLUMES)))
+    assert read_network(plans).head.weights.shape == (4, 16, 1)
+    assert read_network(volumes, VOLUMES).head.weights.shape == (128, 16, 1)
+    with pytest.raises(SettingError, match=r"cell_m = '0\.2': expected '0\.4'"):
+        read_network(plans, VOLUMES)
+    with pytest.raises(SettingError, match=r"cell_m = '0\.4': expected '0\.2'"):
+        read_network(volumes)
 
 
 def changed(**changes: np.ndarray | None) -> bytes:
@@ -50,6 +68,7 @@ NAN = np.where(np.arange(16) == 7, np.nan, 0.0)
         (file_bytes(random_tensors(), {**FEATURES, "cell_m": "0.4"}), "cell_m = '0.4': expected '0.2'"),
         (file_bytes(random_tensors(), {**FEATURES, "cells": "64"}), "cells = '64': expected '128'"),
         (file_bytes(random_tensors(), {**FEATURES, "channels": "mean"}), "channels = 'mean'"),
+        (file_bytes(random_tensors(), {**FEATURES, "layers": "32"}), "layers = '32': expected '1'"),
         (file_bytes(random_tensors(), {"cells": "128"}), "cell_m = None"),
         (file_bytes(random_tensors(), None), "no metadata"),
         (WHOLE[:-4], "merge.2.bias|head.bias"),

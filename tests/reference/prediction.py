@@ -19,9 +19,9 @@ def window(place_m: np.ndarray, corner_m: np.ndarray) -> tuple[int, int]:
     return first[0], first[1]
 
 
-def overlapped(cell: int, voxel: Fraction, count: int) -> range:
+def overlapped(cell: int, voxel: Fraction, count: int, edge: Fraction = CELL) -> range:
     """Voxels along an axis that share more than a point with a cell."""
-    low, high = cell * CELL, (cell + 1) * CELL
+    low, high = cell * edge, (cell + 1) * edge
     return range(max(math.floor(low / voxel), 0), min(math.ceil(high / voxel), count))
 
 
@@ -45,6 +45,29 @@ def channels(
     return cells, solid
 
 
+def volume_channels(
+    mean: np.ndarray, measured: np.ndarray, voxel: Fraction, first: tuple[int, int, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The same of 32 layers of 64 × 64 cells of 0.4 m, and (32, 64, 64) in which nothing was measured."""
+    cells, unknown = np.zeros((65, 64, 64)), np.zeros((32, 64, 64), bool)
+    spans = [
+        [overlapped(start + n, voxel, count, 2 * CELL) for n in range(cells_along)]
+        for start, count, cells_along in zip(first, mean.shape, (64, 64, 32), strict=True)
+    ]
+    for i, across in enumerate(spans[0]):
+        for j, along in enumerate(spans[1]):
+            if not across or not along:
+                cells[64, i, j] = 1.0
+                continue
+            for k, up in enumerate(spans[2]):
+                known = [float(mean[x, y, z]) for x in across for y in along for z in up if measured[x, y, z]]
+                voxels = len(across) * len(along) * len(up)
+                cells[k, i, j] = sum(each > 0.5 for each in known) / voxels if voxels else 1.0
+                cells[32 + k, i, j] = sum(each <= 0.5 for each in known) / voxels if voxels else 0.0
+                unknown[k, i, j] = voxels > 0 and not known
+    return cells, unknown
+
+
 def convolved(image: np.ndarray, weights: np.ndarray, bias: np.ndarray) -> np.ndarray:
     """A convolution with zeros around the image, in float64: (O, H, W) from (I, H, W) and (O, I, K, K)."""
     reach, (height, width) = weights.shape[-1] // 2, image.shape[1:]
@@ -58,7 +81,7 @@ def convolved(image: np.ndarray, weights: np.ndarray, bias: np.ndarray) -> np.nd
 
 
 def logits(tensors: Mapping[str, np.ndarray], cells: np.ndarray) -> np.ndarray:
-    """The U-Net of `prediction.unet`: (N, N) from cells (3, N, N) and tensors as files name them."""
+    """The U-Net of `prediction.unet`: (L, N, N) from cells (2·L + 1, N, N) and tensors as files name them."""
 
     def layer(name: str, image: np.ndarray) -> np.ndarray:
         return convolved(image, tensors[f"{name}.weight"], tensors[f"{name}.bias"])
@@ -76,5 +99,5 @@ def logits(tensors: Mapping[str, np.ndarray], cells: np.ndarray) -> np.ndarray:
     for level in range(LEVELS - 2, -1, -1):
         lifted = layer(f"lift.{level}", values).repeat(2, axis=1).repeat(2, axis=2)
         values = np.maximum(layer(f"merge.{level}", finer[level] + lifted), 0.0)
-    parts = layer("head", values).reshape(2, 2, size // 2, size // 2)
-    return parts.transpose(2, 0, 3, 1).reshape(size, size)
+    parts = layer("head", values).reshape(-1, 2, 2, size // 2, size // 2)
+    return parts.transpose(0, 3, 1, 4, 2).reshape(-1, size, size)

@@ -14,8 +14,9 @@ from safetensors.torch import load_file
 
 from baselines.cli.interruption import Interruption
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED
-from entropy_explore_env.prediction.crop import CELLS, FREE, OUTSIDE, SOLID
+from entropy_explore_env.prediction.crop import CELLS, FREE, OUTSIDE, PLANS, SOLID
 from entropy_explore_env.prediction.predictor import shipped_predictor
+from entropy_explore_env.prediction.volumes import VOLUMES, VolumeWindow
 from entropy_explore_env.prediction.weights import read_network
 from training import map_predictor, map_samples
 from training.map_predictor import Args, drawn_batch, main, masked_loss, rate_at, run_command
@@ -23,6 +24,7 @@ from training.map_samples import (
     RECIPES,
     Sampled,
     Samples,
+    as_plans,
     read_samples,
     sampled_missions,
     scenario_of,
@@ -94,11 +96,43 @@ def test_samples_are_of_what_was_seen_and_what_is_there(whole):
     assert samples.cells.shape == (6, 3, CELLS, CELLS) and recipes.tolist() == [2, 2, 2, 1, 1, 1]
     measured = samples.cells[:, :OUTSIDE].max(axis=1) > 0
     inside = samples.cells[:, OUTSIDE] == 0
-    assert (samples.truth[samples.cells[:, SOLID] > 0].mean() > 0.99) and samples.truth[~inside].all()
-    assert (measured | unmeasured(samples.cells) | ~inside).all()
-    assert not (measured & unmeasured(samples.cells)).any()
+    truth, asked = samples.truth[:, 0], unmeasured(samples.cells)[:, 0]
+    assert (truth[samples.cells[:, SOLID] > 0].mean() > 0.99) and truth[~inside].all()
+    assert (measured | asked | ~inside).all()
+    assert not (measured & asked).any()
     seen_free = (samples.cells[:, FREE] == 252) & inside
-    assert seen_free.any() and samples.truth[seen_free].mean() < 0.02
+    assert seen_free.any() and truth[seen_free].mean() < 0.02
+
+
+def test_a_predictor_of_volumes_is_learned_alike(tmp_path, capsys):
+    words = (
+        "--recipes cave --missions 1 --validation-missions 1 --snapshots 2 --epochs 1 --batch 2 --threads 1"
+    )
+    assert run_command(main, [*words.split(), "--device", "cpu", "--jobs", "1", "--out", str(tmp_path)]) == 0
+    assert "cave" in capsys.readouterr().out
+    network = read_network(tmp_path / "predictor.safetensors", VOLUMES)
+    assert network.head.weights.shape == (4 * VOLUMES.layers, VOLUMES.widths[0], 1)
+    samples, recipes = read_samples(tmp_path / "samples", sampled_missions(("cave",), "train", 1, 2, 0))
+    assert samples.cells.shape == (2, 65, 64, 64) and {RECIPES[n] for n in recipes} == {"cave"}
+    plans = as_plans(samples)
+    assert plans.truth.shape == (64, 1, 64, 64) and plans.truth[plans.cells[:, [SOLID]] == 252].mean() > 0.99
+    seen_free = (plans.cells[:, [FREE]] == 252) & (plans.cells[:, [OUTSIDE]] == 0)
+    assert seen_free.any() and plans.truth[seen_free].mean() < 0.02
+    assert np.array_equal(unmeasured(plans.cells).reshape(samples.truth.shape), unmeasured(samples.cells))
+
+
+@pytest.mark.parametrize("voxel_size_m", [0.25, 0.4, 1.0])
+def test_a_cell_of_a_volume_is_solid_if_its_middle_is(voxel_size_m):
+    occupied = np.random.default_rng(2).random((9, 7, 5)) < 0.4
+    window = VolumeWindow(-3, -16, 1)
+    found = map_samples._solid_cells(occupied, voxel_size_m, window)
+    assert found.shape == (32, 64, 64)
+    for k, i, j in np.random.default_rng(3).integers(0, (8, 30, 34), (300, 3)):
+        cell = window.x + i, window.y + j, window.z + k
+        at = tuple(math.floor((n + 0.5) * 0.4 / voxel_size_m) for n in cell)
+        inside = all(0 <= n < count for n, count in zip(at, occupied.shape, strict=True))
+        assert found[k, i, j] == (occupied[at] if inside else True)
+    assert not found[:8, :30, :34].all()
 
 
 def test_samples_of_other_options_are_other_files(tmp_path):
@@ -163,7 +197,7 @@ def test_the_shipped_weights_tell_rooms_from_rock_in_worlds_that_they_never_saw(
     validation = sampled_missions(RECIPES_HERE, "validation", 1, 3, 1)
     samples, recipes = read_samples(whole / "samples", validation)
     shipped = shipped_predictor().network
-    cells = scored(samples, recipes, predictions(shipped, samples), nearest_shares(samples))
+    cells = scored(samples, recipes, predictions(shipped, PLANS, samples), nearest_shares(samples))
     figures = figures_of(cells)
     for recipe in RECIPES_HERE:
         assert figures[recipe]["predicted_bits"] < 0.8 * figures[recipe]["base_rate_bits"], recipe
@@ -180,7 +214,8 @@ def test_a_recipe_that_is_left_out_is_told_of_and_not_learned(started, monkeypat
 @pytest.mark.parametrize(
     ("more", "said"),
     [
-        ("--recipes cave", "recipes = 'cave'"),
+        ("--recipes room", "recipes = 'room'"),
+        ("--recipes cave office", "plans alone, or volumes alone"),
         ("--leave-out office", "leave_out = 'office'"),
         ("--recipes cluttered --leave-out cluttered", "not the only recipe"),
         ("--epochs 0", "epochs = 0"),
@@ -226,17 +261,17 @@ def test_missions_are_counted_as_they_are_sampled(tmp_path, monkeypatch, capsys)
 
 def test_turns_and_mirrors_move_cells_and_truth_together():
     rng = np.random.default_rng(0)
-    truth = rng.random((2, CELLS, CELLS)) < 0.3
+    truth = rng.random((2, 1, CELLS, CELLS)) < 0.3
     cells = np.zeros((2, 3, CELLS, CELLS), np.uint8)
     shown = rng.random(truth.shape) < 0.5
-    cells[:, SOLID][shown & truth], cells[:, FREE][shown & ~truth] = 252, 252
+    cells[:, SOLID:FREE][shown & truth], cells[:, FREE:OUTSIDE][shown & ~truth] = 252, 252
     given, forms = (torch.from_numpy(cells), torch.from_numpy(truth), torch.tensor([1])), set()
     for _ in range(40):
         told, solid, asked = drawn_batch(*given, rng)
         known = asked == 0.0
-        assert torch.equal(told[:, SOLID][known], solid[known])
-        assert torch.equal(told[:, FREE][known], 1.0 - solid[known])
-        assert bool(((asked == 1.0) == (told[:, :2].sum(dim=1) == 0.0)).all())
+        assert torch.equal(told[:, [SOLID]][known], solid[known])
+        assert torch.equal(told[:, [FREE]][known], 1.0 - solid[known])
+        assert bool(((asked == 1.0) == (told[:, :2].sum(dim=1, keepdim=True) == 0.0)).all())
         forms.add(solid.numpy().tobytes())
     assert len(forms) == 8
 
@@ -272,8 +307,8 @@ def test_the_nearest_measured_cell_by_hand():
     assert bins[0, 4, 5] == 1 and bins[0, 39, 5] == 0  # 0.2 m from solid, 0.2 m from free
     assert bins[0, 3, 8] == 2 * 2 + 1 and bins[0, 43, 9] == 2 * 3  # 0.6 m, 1.0 m
     assert near[0, 3, 25] and not near[0, 3, 26]  # 4.0 m, 4.2 m
-    truth = np.zeros((1, CELLS, CELLS), bool)
-    truth[0, 4, 5] = True
+    truth = np.zeros((1, 1, CELLS, CELLS), bool)
+    truth[0, 0, 4, 5] = True
     samples = Samples(cells, truth)
     shares = nearest_shares(samples)
     assert shares[1] == pytest.approx((1 + 1) / (8 + 2))  # one of eight neighbours is solid

@@ -13,13 +13,13 @@ from entropy_explore_env.belief.fields import Belief
 from entropy_explore_env.belief.map_update import fuse_scan
 from entropy_explore_env.belief.raycast import longest_crossing
 from entropy_explore_env.belief.visibility import CONE, cone_of, mark_cones
+from entropy_explore_env.prediction.crop import UNPREDICTED
 from entropy_explore_env.robots.range_sensor import Scene, SensorPose, new_scan, sensor_model, take_scan
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.scenarios import BOX
 from entropy_explore_env.settings.sensor import RangeSensor
 from entropy_explore_env.viewpoints.evaluation import new_scratch, robot_model
 from entropy_explore_env.viewpoints.expected_scan import (
-    UNPREDICTED,
     ScanModel,
     expected_bits,
     fill_bits,

@@ -127,5 +127,5 @@ def observe_prediction(begin, params, shape, start, known, predicting, row):
         for j in range(shape[1]):
             x, y, cell = corner_x + i, corner_y + j, i * shape[1] + j
             told = predicting.cells[SOLID, x, y] + predicting.cells[FREE, x, y]
-            out[cell] = predicting.solid[x, y]
+            out[cell] = predicting.solid[0, x, y]
             out[cells + cell] = 1.0 if told > 0.0 else 0.0
