@@ -28,7 +28,7 @@ help:
 	@echo "make test-benchmarl   the tutorial with BenchMARL"
 	@echo "make lint         ruff, pyright and the contracts of imports"
 	@echo "make bench        speed against peers"
-	@echo "make predictor    trains the networks that predict maps: two hours of a processor"
+	@echo "make predictor    trains the networks that predict maps: an hour and a half of a processor"
 	@echo "make policy       searches weights of the planner's features: one to three hours of two processors"
 	@echo "make reliability  all proofs, into docs/results/reliability.md: many hours"
 	@echo "make night        some minutes of each proof, other cases every night"

@@ -145,8 +145,8 @@ def main(words: Sequence[str]) -> int:
             network = read_network(args.out / "predictor.safetensors", form)
     predicted = predictions(network, form, validation[0])
     every_nth = max(len(samples.truth) // _NEAREST_SAMPLES, 1)
-    shares = nearest_shares(Samples(*(values[::every_nth] for values in samples)))
-    figures = figures_of(scored(*validation, predicted, shares))
+    shares = nearest_shares(Samples(*(values[::every_nth] for values in samples)), form.cell_m)
+    figures = figures_of(scored(*validation, form.cell_m, predicted, shares))
     told = {name: getattr(args, name) for name in (*_OPTIONS, "threads")}
     told["device"] = str(device_of(args))
     told |= {"weights": None if args.weights is None else args.weights.name, "version": VERSION}
@@ -374,7 +374,7 @@ def _taken_up(args: Args) -> tuple[int, dict[str, torch.Tensor]]:
         raise SettingError(
             "out", str(file), "a file that this command wrote: remove it to begin anew"
         ) from None
-    theirs = json.loads(about.get("origin", "{}"))
+    theirs = {"layers": "1", **json.loads(about.get("origin", "{}"))}
     for name, value in json.loads(_origin(args)).items():
         if theirs.get(name) != value:
             allowed = f"{theirs.get(name)!r} as in the run in {args.out}, or another folder --out"

@@ -1,9 +1,9 @@
 """Samples for a predictor of maps: what a robot has measured around it, and what is there, cut from missions.
 
 Missions of today's strategies run in worlds of the splits train and validation; of the dungeons, those with
-odd numbers, the highest ten of which validate. Sensors, voxels, team sizes and the size of the workspace
-vary. From each mission some decisions are kept, drawn at random. A mission's samples are one file, and
-missions whose file is there are not run again.
+odd numbers, the highest ten of which validate. Team sizes vary, and in plans sensors, voxels and the size of
+the workspace. From each mission some decisions are kept, drawn at random. A mission's samples are one file,
+and missions whose file is there are not run again.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ def scenario_of(sampled: Sampled, rng: np.random.Generator) -> Scenario:
     if rng.random() < 0.5:
         changes["robot"] = {"redecide": "on_scan"}
         changes["sensor"]["scan_every_m"] = 1.0
-    if sampled.recipe in VOLUME_RECIPES:
+    if sampled.recipe in VOLUME_RECIPES:  # robots there stay as they are
         alone = {name: changes[name] for name in ("robots", "split", "ending")}
         return with_settings(SCENARIOS[sampled.recipe], alone)
     voxel_size_m, scale = float(rng.choice(_VOXELS_M)), float(rng.choice(_SCALES))
@@ -212,6 +212,14 @@ def read_samples(folder: Path, missions: Iterable[Sampled]) -> tuple[Samples, np
         try:
             arrays = stored_arrays(zlib.decompress(file.read_bytes()))
             truth = np.unpackbits(arrays["truth"], axis=-1).astype(bool)
+            form = form_of(sampled.recipe)
+            square = (form.cells, form.cells)
+            if truth.shape[1:] != (form.layers, *square) or arrays["cells"].shape != (
+                len(truth),
+                form.channels,
+                *square,
+            ):
+                raise ValueError(f"samples of another form in {file}")
         except (OSError, ValueError, KeyError, EOFError, zlib.error, io.UnsupportedOperation):
             allowed = "samples that this command wrote: remove that file, and it is made again"
             raise SettingError("out", str(file), allowed) from None

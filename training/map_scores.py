@@ -1,7 +1,7 @@
 """How good predictions of maps are: log loss beside two baselines, calibration, and pictures to look at.
 
-Scores count the cells of a workspace in which nothing was measured, and nothing else; of a volume, each layer
-counts as a sample. A log loss is in bits a cell,
+Scores count the cells of a workspace in which nothing was measured, and nothing else. A log loss is in bits a
+cell,
 
     -mean(y log2 p + (1 - y) log2(1 - p)),
 
@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from entropy_explore_env.prediction.crop import CELL_M, OUTSIDE, SOLID
+from entropy_explore_env.prediction.crop import OUTSIDE, SOLID
 from entropy_explore_env.prediction.predictor import new_predicting
 from entropy_explore_env.prediction.unet import Form, Network, fill_unmeasured, infer
 from training.map_samples import RECIPES, Samples, as_channels, as_plans, unmeasured
@@ -60,47 +60,52 @@ def predictions(network: Network, form: Form, samples: Samples) -> np.ndarray:
     return found
 
 
-def nearest_bins(cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (N, C, C) int64, the bin of `nearest` of each cell, and (N, C, C) bool, whether it is near."""
-    bins, near = np.zeros((len(cells), *cells.shape[2:]), np.int64), []
+def nearest_bins(cells: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the bin of `nearest` of each cell, and whether it is near; both (N, L, C, C).
+
+    Args:
+        cells: (N, 2·L + 1, C, C), channels.
+        cell_m: Edge of a cell.
+    """
+    layers = cells.shape[1] // 2
+    bins, near = np.full((len(cells), layers, *cells.shape[2:]), 2 * len(_EDGES_M), np.int64), []
     for number, sample in enumerate(cells):
-        measured = sample[:OUTSIDE].max(axis=0) > 0
+        measured = (sample[:layers] > 0) | (sample[layers : 2 * layers] > 0)
+        near.append(measured)
         if not measured.any():
-            bins[number] = 2 * len(_EDGES_M)
-            near.append(measured)
             continue
         found: Any = distance_transform_edt(~measured, return_indices=True)
-        apart_m, (x, y) = CELL_M * found[0], found[1]
-        bins[number] = 2 * np.searchsorted(_EDGES_M, apart_m) + (sample[SOLID, x, y] > 0)
-        near.append(apart_m <= NEAR_M)
+        apart_m, (layer, x, y) = cell_m * found[0], found[1]
+        bins[number] = 2 * np.searchsorted(_EDGES_M, apart_m) + (sample[layer, x, y] > 0)
+        near[-1] = apart_m <= NEAR_M
     return bins, np.array(near)
 
 
-def nearest_shares(samples: Samples) -> np.ndarray:
+def nearest_shares(samples: Samples, cell_m: float) -> np.ndarray:
     """Return (2·B,) float64, the share of solid cells of each bin of `nearest`."""
-    plans = as_plans(samples)
-    asked = unmeasured(plans.cells)[:, 0]
-    bins = nearest_bins(plans.cells)[0][asked]
+    asked = unmeasured(samples.cells)
+    bins = nearest_bins(samples.cells, cell_m)[0][asked]
     size = 2 * len(_EDGES_M) + 2
-    solid = np.bincount(bins, plans.truth[:, 0][asked], minlength=size)
+    solid = np.bincount(bins, samples.truth[asked], minlength=size)
     return (solid + 1.0) / (np.bincount(bins, minlength=size) + 2.0)
 
 
-def scored(samples: Samples, recipes: np.ndarray, predicted: np.ndarray, shares: np.ndarray) -> Scored:
+def scored(
+    samples: Samples, recipes: np.ndarray, cell_m: float, predicted: np.ndarray, shares: np.ndarray
+) -> Scored:
     """Return the cells in which nothing was measured, with what is predicted of them.
 
     Args:
         samples: N of validation.
         recipes: (N,) number in RECIPES of where each comes from.
+        cell_m: Edge of a cell.
         predicted: (N, L, C, C) of a predictor.
         shares: Of `nearest_shares`.
     """
-    plans, layers = as_plans(samples), samples.truth.shape[1]
-    asked = unmeasured(plans.cells)[:, 0]
-    bins, near = nearest_bins(plans.cells)
-    where = np.broadcast_to(np.repeat(recipes, layers)[:, None, None], asked.shape)[asked]
-    truth, guess = plans.truth[:, 0], predicted.reshape(asked.shape)
-    return Scored(truth[asked], guess[asked], shares[bins[asked]], near[asked], where)
+    asked = unmeasured(samples.cells)
+    bins, near = nearest_bins(samples.cells, cell_m)
+    where = np.broadcast_to(recipes[:, None, None, None], asked.shape)[asked]
+    return Scored(samples.truth[asked], predicted[asked], shares[bins[asked]], near[asked], where)
 
 
 def log_loss_bits(truth: np.ndarray, predicted: np.ndarray) -> float:

@@ -23,6 +23,7 @@ from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.explorer.planned_rate import LearnedForesight, PlannedRate
 from entropy_explore_env.prediction.predictor import Predictor, read_predictor
+from entropy_explore_env.prediction.volumes import VolumePredictor, read_volume_predictor
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import SCENARIOS
@@ -100,22 +101,24 @@ class TrueMap(PlannedRate):
 class LeftOut(PlannedRate):
     """The planner whose predictor never saw a world of the mission's recipe.
 
-    `python -m training.map_predictor --leave-out RECIPE --out runs/without-RECIPE` trains it.
+    `python -m training.map_predictor --leave-out RECIPE --out runs/without-RECIPE` trains it; for volumes,
+    add `--recipes cave office-3d`.
     """
 
     def __init__(self) -> None:
         """Wait for the mission's recipe."""
         super().__init__(foresight=lambda: LearnedForesight(self._predictor))
-        self._predictor: Predictor | None = None
+        self._predictor: Predictor | VolumePredictor | None = None
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
         recipe = str(scenario.world).split("-")[0]
         file = Path("runs") / f"without-{recipe}" / "predictor.safetensors"
         if not file.is_file():
-            trained = f"python -m training.map_predictor --leave-out {recipe} --out {file.parent}"
+            recipes = "" if scenario.grid.flat else "--recipes cave office-3d "
+            trained = f"python -m training.map_predictor {recipes}--leave-out {recipe} --out {file.parent}"
             raise SettingError("strategy", "LeftOut", f"{file}, which `{trained}` writes; then --rerun")
-        self._predictor = read_predictor(file)
+        self._predictor = read_predictor(file) if scenario.grid.flat else read_volume_predictor(file)
         super().reset(scenario, rng)
 
 
@@ -126,7 +129,7 @@ STRATEGIES = (WITHOUT, "planned-rate", TRUE_MAP, CONSTANT)
 
 
 def tasks(quick: bool = False) -> tuple[Task, ...]:
-    """Return the tasks: teams in plans, and one robot in dungeons."""
+    """Return the tasks: teams in plans and caves, and one robot in dungeons."""
     starts = QUICK_STARTS if quick else STARTS
     base = SCENARIOS["office"]
     dungeons = (f"dungeon-{number}" for number in (_QUICK_DUNGEONS if quick else _DUNGEONS))

@@ -5,8 +5,8 @@ as those that a policy chooses among where candidates are the actions. A far pla
 more than every viewpoint nearby, along the shortest path by the robot's belief, and the robot decides anew at
 every stop. What a robot is, and what its mission asks for, decides how it explores:
 
-- Flying robots, and all in 3-D worlds: bits per time, with the recipe of narrow or of wide views; in caves of
-  scans imagined in a predicted map.
+- Flying robots, and all in 3-D worlds: bits per time, with the recipe of narrow or of wide views. In caves,
+  scans are imagined in a predicted map.
 - Drones that see all around and scan in flight, in grids that are fine for them, in missions that end by what
   was seen: by bits per time, and on tours of frontier cells while they gain little.
 - Ground robots with a scanner that sees all around, in a plan, until the map has a given entropy: bits per

@@ -16,6 +16,7 @@ import numpy as np
 from entropy_explore_env.missions.view import RobotView
 from entropy_explore_env.planner.thresholds import (
     COURSE_DECISIONS,
+    MOST_PREDICTED_VOXELS,
     RENEWED_DECISIONS,
     RENEWED_M,
     SOLID_SHARE,
@@ -24,6 +25,7 @@ from entropy_explore_env.planner.thresholds import (
 )
 from entropy_explore_env.prediction.crop import ROUNDING, UNPREDICTED
 from entropy_explore_env.prediction.predictor import Prediction, Predictor
+from entropy_explore_env.prediction.volumes import VOLUMES, VolumePredictor
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
@@ -38,9 +40,9 @@ def predictions_pay(scenario: Scenario) -> bool:
     """Return whether predictions pay in missions that end when a map is known.
 
     They do for ground robots that see all around, in plans, and for flying ones with a narrow view on planned
-    paths, in volumes; for both where they decide at stops. Missions that end when enough is seen took as
-    long, even with the true map in place of the prediction; robots that decide under way turned back too
-    often.
+    paths, in volumes in which a prediction is quick; for both where they decide at stops. Missions that end
+    when enough is seen took as long, even with the true map in place of the prediction; robots that decide
+    under way turned back too often.
     """
     return not scenario.ending.by_seen and all(_pay_for(scenario, kind) for kind in scenario.kinds)
 
@@ -51,7 +53,8 @@ def _pay_for(scenario: Scenario, kind: RobotKind) -> bool:
         return False
     if scenario.grid.flat:
         return robot.motion == "planar" and around
-    return robot.motion == "free" and robot.navigator == "planned" and not around
+    small = scenario.grid.voxels <= MOST_PREDICTED_VOXELS
+    return small and robot.motion == "free" and robot.navigator == "planned" and not around
 
 
 class LearnedForesight:
@@ -62,8 +65,8 @@ class LearnedForesight:
     where those of one opening change with its place, it would do so for good.
     """
 
-    def __init__(self, predictor: Predictor | None = None) -> None:
-        """Begin a mission; without a predictor of plans, take that of the library."""
+    def __init__(self, predictor: Predictor | VolumePredictor | None = None) -> None:
+        """Begin a mission; without a predictor, take that of the library for plans or for volumes."""
         self._predictor = predictor
         self._latest: dict[int, _Predicted] = {}
         self._courses: defaultdict[int, deque[np.ndarray]] = defaultdict(_new_course)
@@ -85,10 +88,14 @@ class LearnedForesight:
         return latest.solid
 
     def _predicted(self, view: RobotView) -> np.ndarray | None:
-        if not view.scenario.grid.flat:
-            return _solid_volume(view.predicted_volume)
-        predicted = view.prediction if self._predictor is None else view.predicted_by(self._predictor)
-        return _predicted_solid(view, predicted)
+        predictor = self._predictor
+        if isinstance(predictor, VolumePredictor):
+            return _solid_volume(view, view.volume_predicted_by(predictor))
+        if predictor is not None:
+            return _solid_plan(view, view.predicted_by(predictor))
+        if view.scenario.grid.flat:
+            return _solid_plan(view, view.prediction)
+        return _solid_volume(view, view.predicted_volume)
 
     def _goes_to_and_fro(self, view: RobotView) -> bool:
         """Return whether a robot drove far in its last decisions, and stayed in a small part of the world."""
@@ -124,13 +131,27 @@ class _Predicted:
         return bool(moved_m >= RENEWED_M or self.decisions >= RENEWED_DECISIONS)
 
 
-def _solid_volume(predicted: np.ndarray) -> np.ndarray | None:
+def _solid_volume(view: RobotView, predicted: np.ndarray) -> np.ndarray | None:
     """Return what a Foresight says by (X, Y, Z) `RobotView.predicted_volume`."""
-    held = predicted[predicted != UNPREDICTED]
-    return None if not len(held) or held.mean() < SOLID_SHARE_IN_VOLUMES else predicted.reshape(-1)
+    held = predicted != UNPREDICTED
+    if not held.any() or predicted[held].mean() < SOLID_SHARE_IN_VOLUMES:
+        return None
+    voxels = view.scenario.grid.voxel_size_m / VOLUMES.cell_m
+    if voxels < 1.0:
+        predicted = np.where(held, _stops(predicted, voxels), np.float32(UNPREDICTED))
+    return predicted.reshape(-1)
 
 
-def _predicted_solid(view: RobotView, prediction: Prediction) -> np.ndarray | None:
+def _stops(solid: np.ndarray, voxels: float) -> np.ndarray:
+    """Return how probably a voxel stops a ray, of which one as large as a cell does with `solid`.
+
+    `voxels` is the edge of a voxel over that of a cell: a ray across several voxels of a cell stops in one of
+    them.
+    """
+    return 1.0 - (1.0 - solid) ** voxels
+
+
+def _solid_plan(view: RobotView, prediction: Prediction) -> np.ndarray | None:
     grid = view.scenario.grid
     (columns, across), (rows, along) = (_cells(prediction, grid, axis) for axis in (0, 1))
     guess = prediction.solid[np.ix_(across, along)]
@@ -138,9 +159,7 @@ def _predicted_solid(view: RobotView, prediction: Prediction) -> np.ndarray | No
     if not unknown.any() or guess[unknown].mean() < SOLID_SHARE:
         return None
     solid = np.full(grid.shape, UNPREDICTED, np.float32)
-    # a ray across a cell of several voxels stops in one of them
-    voxels = min(grid.voxel_size_m / prediction.cell_m, 1.0)
-    solid[columns, rows, 0] = 1.0 - (1.0 - guess) ** voxels
+    solid[columns, rows, 0] = _stops(guess, min(grid.voxel_size_m / prediction.cell_m, 1.0))
     return solid.reshape(-1)
 
 

@@ -24,7 +24,10 @@ SOLID_SHARE = 0.25
 """Mean predicted probability to be solid, of what was not measured, from which on imagined rays stop as
 predicted (tuned: it lies between offices, whose walls are thin, and all other plans)."""
 SOLID_SHARE_IN_VOLUMES = 0.5
-"""The same of the voxels around a robot in a volume (tuned: it lies between furnished offices and caves)."""
+"""Mean predicted probability to be solid, of the voxels around a robot in a volume, from which on imagined
+rays stop as predicted (tuned: it lies between furnished offices and caves)."""
+MOST_PREDICTED_VOXELS = 4_000_000
+"""Voxels of the largest volume in which something is predicted (by construction: time and memory)."""
 RENEWED_M, RENEWED_DECISIONS = 1.0, 8
 """Metres that a robot moves, and decisions that it makes, until its prediction is renewed (tuned)."""
 COURSE_DECISIONS, TO_AND_FRO = 16, 6.0

@@ -35,7 +35,7 @@ from entropy_explore_env.prediction.unet import (
     infer,
     new_planes,
 )
-from entropy_explore_env.prediction.weights import SHIPPED, read_network
+from entropy_explore_env.prediction.weights import SHIPPED, check_form, read_network
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.observation import Observation
 
@@ -116,7 +116,12 @@ class Predictor:
     """A network that predicts what was never measured."""
 
     def __init__(self, network: Network) -> None:
-        """Take the network: see `read_network` and `shipped_predictor`."""
+        """Take the network: see `read_predictor` and `shipped_predictor`.
+
+        Raises:
+            SettingError: It is not one for plans.
+        """
+        check_form(network, PLANS)
         self.network = network
 
     def predict(

@@ -2,30 +2,34 @@
 
 A crop is 64 × 64 cells of 0.4 m around the robot in 32 layers, which begin at the floor of the workspace, or
 higher where it is taller. Of each cell it is told which shares of its voxels were measured as covered and as
-free. Cells above and below the workspace count as solid. The network was trained in caves and furnished
-offices, for robots that fly (`training.map_predictor`).
+free. Cells above the workspace count as solid. The network was trained in caves of 0.4 m voxels and furnished
+offices of 0.25 m, for robots that fly (`training.map_predictor`).
 """
 
 from __future__ import annotations
 
 import math
 from functools import cache
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from entropy_explore_env.compilation.kernels import lean_kernel
+from entropy_explore_env.errors import SettingError
 from entropy_explore_env.prediction.crop import (
     ROUNDING,
     UNPREDICTED,
     Around,
+    around,
     count_measured,
     first_cell,
     overlapped,
 )
 from entropy_explore_env.prediction.predictor import new_predicting
 from entropy_explore_env.prediction.unet import Form, Network, fill_unmeasured, infer
-from entropy_explore_env.prediction.weights import LEARNED, read_network
+from entropy_explore_env.prediction.weights import LEARNED, check_form, read_network
+from entropy_explore_env.settings.grid import Grid
 
 VOLUMES = Form(64, 32, 0.4, (16, 32, 40, 40))
 """What a network for volumes is."""
@@ -118,19 +122,41 @@ class VolumePredictor:
     """A network that predicts what was never measured in a volume."""
 
     def __init__(self, network: Network) -> None:
-        """Take a network of the form VOLUMES."""
+        """Take the network: see `read_volume_predictor` and `shipped_volume_predictor`.
+
+        Raises:
+            SettingError: It is not one for volumes.
+        """
+        check_form(network, VOLUMES)
         self.network = network
 
-    def predict(self, there: Around) -> np.ndarray:
+    def predict(
+        self,
+        grid: Grid,
+        mean: np.ndarray,
+        precision: np.ndarray,
+        sigma_prior: float,
+        place_m: np.ndarray,
+    ) -> np.ndarray:
         """Predict around a place; a workspace smaller than the crop is predicted as it is.
 
         Args:
-            there: See `crop.around`, which checks what it is given.
+            grid: Of the belief, which is no plan.
+            mean: (X, Y, Z) float32, expected coverage.
+            precision: (X, Y, Z) float32, 1/σ² of it.
+            sigma_prior: σ of voxels that were never measured.
+            place_m: (3,) x, y, z, map frame; further numbers do not count.
 
         Returns:
             (X, Y, Z) float32, read-only: the probability of each voxel to be solid; UNPREDICTED of those that
             were measured, or lie outside of the crop.
+
+        Raises:
+            SettingError: The grid is flat, the belief is not of the grid, or a number is not finite.
         """
+        if grid.flat:
+            raise SettingError("Grid.shape", grid.shape, "several layers of voxels: `Predictor` is for plans")
+        there = around(grid, mean, precision, sigma_prior, place_m, 0.0)
         predicting = new_predicting(self.network, VOLUMES)
         out = np.empty(there.belief.size, np.float32)
         predict_volume(predicting, there.belief, there.place, out.reshape(-1))
@@ -146,7 +172,16 @@ def pool_volume_crop(there: Around) -> tuple[np.ndarray, VolumeWindow]:
     return cells, window
 
 
+def read_volume_predictor(file: Path) -> VolumePredictor:
+    """Read a predictor from a file that `training.map_predictor` wrote.
+
+    Raises:
+        SettingError: See `read_network`.
+    """
+    return VolumePredictor(read_network(file, VOLUMES))
+
+
 @cache
 def shipped_volume_predictor() -> VolumePredictor:
     """Return the predictor of volumes that comes with the library."""
-    return VolumePredictor(read_network(SHIPPED_VOLUMES, VOLUMES))
+    return read_volume_predictor(SHIPPED_VOLUMES)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from entropy_explore_env.errors import SettingError
+from entropy_explore_env.errors import SettingError, counted
 from entropy_explore_env.prediction.crop import CHANNELS, PLANS
 from entropy_explore_env.prediction.unet import LEVELS, Form, Layer, Network, layer_shapes
 
@@ -57,6 +57,16 @@ def read_network(file: Path, form: Form = PLANS) -> Network:
         merge=tuple(layers[f"merge.{level}"] for level in range(LEVELS - 1)),
         head=layers["head"],
     )
+
+
+def check_form(network: Network, form: Form) -> None:
+    """Raise a SettingError where a network is of another form: kernels read its numbers unchecked."""
+    layers = {"head": network.head}
+    for part in ("first", "second", "lift", "merge"):
+        layers |= {f"{part}.{level}": layer for level, layer in enumerate(getattr(network, part))}
+    shapes = {name: layer.weights.shape for name, layer in layers.items()}
+    if shapes != layer_shapes(form):
+        raise SettingError("network", shapes, f"a network for crops of {counted(form.layers, 'layer')}")
 
 
 def _tensor_shapes(form: Form) -> dict[str, tuple[int, ...]]:

@@ -11,7 +11,6 @@ from functools import cached_property
 
 import numpy as np
 
-from entropy_explore_env.prediction.crop import around
 from entropy_explore_env.prediction.predictor import Prediction, Predictor, shipped_predictor
 from entropy_explore_env.prediction.volumes import VolumePredictor, shipped_volume_predictor
 from entropy_explore_env.robots.motion import MoveEnd
@@ -156,14 +155,14 @@ class RobotKnowledge:
         the library; `prediction.crop.UNPREDICTED` of voxels that were measured or are farther away.
 
         Raises:
-            SettingError: The map holds a number that is not finite.
+            SettingError: The map is a plan, or holds a number that is not finite.
         """
         return self.volume_predicted_by(shipped_volume_predictor())
 
     def volume_predicted_by(self, predictor: VolumePredictor) -> np.ndarray:
         """Return what a predictor says of the voxels around the robot: see `predicted_volume`."""
-        given = (self.mean, self.precision, self.scenario.sigma_prior)
-        return predictor.predict(around(self.scenario.grid, *given, self.pose, 0.0))
+        known = (self.mean, self.precision, self.scenario.sigma_prior)
+        return predictor.predict(self.scenario.grid, *known, self.pose)
 
     @property
     def planar(self) -> bool:

@@ -108,6 +108,22 @@ def test_a_robot_that_drives_to_and_fro_goes_on_without_predictions(places_m, wi
     assert foreseen(view) is not None
 
 
+def test_height_counts_in_volumes():
+    """A robot that climbs gets another prediction, and one that flies up and down goes on without."""
+    foreseen, view = LearnedForesight(), view_of(None, shape=(3, 4, 5))
+    view.predicted_volume = np.full((3, 4, 5), 0.9, np.float32)
+    before = foreseen(view)
+    view.pose[2] += 0.9 * RENEWED_M
+    assert np.shares_memory(foreseen(view), before)
+    view.predicted_volume = np.full((3, 4, 5), 0.8, np.float32)
+    view.pose[2] += 0.2 * RENEWED_M
+    assert not np.shares_memory(foreseen(view), before)
+    for number in range(COURSE_DECISIONS):
+        view.pose[2] = 2.0 * (number % 2)
+        found = foreseen(view)
+    assert found is None
+
+
 def test_a_prediction_that_holds_no_centre_says_nothing():
     assert LearnedForesight()(view_of(drawn_cells((5, 6)), voxel_size_m=4.0)) is None
 
@@ -125,6 +141,8 @@ def test_a_prediction_that_holds_no_centre_says_nothing():
         ("cave", {"robot": {"navigator": "straight"}}, False),
         ("cave", {"sensor": {"field_of_view_rad": (6.28, 1.0)}}, False),
         ("office-3d", {}, True),
+        ("cave", {"grid": {"shape": (400, 250, 40)}}, True),
+        ("cave", {"grid": {"shape": (400, 250, 41)}}, False),
         ("lab", {}, False),
         ("office-mixed", {}, False),
         ("corridor", {"robot": {"redecide": "on_scan"}, "sensor": {"scan_every_m": 1.0}}, False),
@@ -141,12 +159,15 @@ def test_a_volume_is_predicted_where_much_of_it_is_solid():
     predicted = np.full((3, 4, 5), UNPREDICTED, np.float32)
     predicted[0], predicted[1] = SOLID_SHARE_IN_VOLUMES + 0.1, SOLID_SHARE_IN_VOLUMES - 0.05
     view = view_of(None, shape=predicted.shape)
-    for change, heeded in ((0.0, True), (0.1, False)):
-        predicted[0] -= change
+    for voxel_size_m in (0.2, 0.4, 0.8):
+        view = view_of(None, voxel_size_m, predicted.shape)
         view.predicted_volume = predicted
-        found = LearnedForesight()(view)
-        assert (found is not None) == heeded
-        assert found is None or np.array_equal(found, predicted.reshape(-1))
+        found = LearnedForesight()(view).reshape(predicted.shape)
+        across = max(0.4 / voxel_size_m, 1.0)  # of so many voxels one stops as often as the cell
+        np.testing.assert_allclose(found[:2], 1.0 - (1.0 - predicted[:2]) ** (1.0 / across), atol=1e-6)
+        assert (found[2] == UNPREDICTED).all()
+    view.predicted_volume = predicted - np.float32(0.1) * (predicted > 0.0)
+    assert LearnedForesight()(view) is None
     view.predicted_volume = np.full(predicted.shape, UNPREDICTED, np.float32)
     assert LearnedForesight()(view) is None
 

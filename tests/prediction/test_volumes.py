@@ -9,6 +9,7 @@ import pytest
 
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.prediction.crop import UNPREDICTED, around
+from entropy_explore_env.prediction.predictor import Predictor, shipped_predictor
 from entropy_explore_env.prediction.volumes import (
     VOLUMES,
     VolumePredictor,
@@ -39,6 +40,8 @@ def test_cells_are_those_of_exact_fractions(shape, voxel, origin_m):
     mean, precision, measured = drawn_belief(shape, 3)
     there = around(grid, mean, precision, SIGMA_PRIOR, in_the_middle(grid), 0.0)
     cells, window = pool_volume_crop(there)
+    first = reference.window(in_the_middle(grid), np.asarray(origin_m), 2 * reference.CELL, 64)
+    assert (window.x, window.y) == first
     expected, unknown = reference.volume_channels(mean, measured, voxel, window)
     np.testing.assert_allclose(cells, expected, rtol=1e-6)
     assert unknown.any() and (expected[:64] > 0.0).any() and expected[64].any()
@@ -77,7 +80,7 @@ def test_voxels_are_predicted_by_the_cell_of_their_centre(predictor, shape, voxe
     first = volume_window(there.belief, there.place)
     cells, unknown = reference.volume_channels(mean, measured, voxel, first)
     solid = 1.0 / (1.0 + np.exp(-reference.logits(random_tensors(form=VOLUMES), cells)))
-    found = predictor.predict(there)
+    found = predictor.predict(grid, mean, precision, SIGMA_PRIOR, in_the_middle(grid))
     expected = np.full(shape, UNPREDICTED)
     for at in np.ndindex(*shape):
         i, j, k = (
@@ -96,7 +99,7 @@ def test_memory_of_earlier_crops_changes_no_bit(predictor):
     grid = Grid((40, 30, 12), 0.4)
     beliefs = [drawn_belief(grid.shape, seed)[:2] for seed in (1, 2, 1)]
     place_m = np.array([8.0, 6.0, 2.0])
-    found = [predictor.predict(around(grid, *each, SIGMA_PRIOR, place_m, 0.0)) for each in beliefs]
+    found = [predictor.predict(grid, *each, SIGMA_PRIOR, place_m) for each in beliefs]
     assert np.array_equal(found[0], found[2]) and not np.array_equal(found[0], found[1])
 
 
@@ -105,4 +108,14 @@ def test_a_belief_with_a_number_that_is_none_is_refused(predictor):
     mean, precision, _ = drawn_belief(grid.shape, 1)
     mean[3, 2, 1] = np.nan
     with pytest.raises(SettingError, match="mean"):
-        predictor.predict(around(grid, mean, precision, SIGMA_PRIOR, np.ones(3), 0.0))
+        predictor.predict(grid, mean, precision, SIGMA_PRIOR, np.ones(3))
+
+
+def test_plans_and_networks_of_plans_are_refused(predictor):
+    grid = Grid((8, 7, 1), 0.4)
+    with pytest.raises(SettingError, match="several layers of voxels"):
+        predictor.predict(grid, *drawn_belief(grid.shape, 1)[:2], SIGMA_PRIOR, np.ones(3))
+    with pytest.raises(SettingError, match="a network for crops of 32 layers"):
+        VolumePredictor(shipped_predictor().network)
+    with pytest.raises(SettingError, match="a network for crops of 1 layer"):
+        Predictor(predictor.network)

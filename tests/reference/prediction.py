@@ -12,10 +12,12 @@ CELL = Fraction(1, 5)
 CELLS, STEP, LEVELS = 128, 16, 4
 
 
-def window(place_m: np.ndarray, corner_m: np.ndarray) -> tuple[int, int]:
+def window(
+    place_m: np.ndarray, corner_m: np.ndarray, edge: Fraction = CELL, cells: int = CELLS
+) -> tuple[int, int]:
     """First cells of a crop: the multiple of 16 that is nearest to the place, less half a crop."""
     from_corner = np.asarray(place_m)[:2] - np.asarray(corner_m)[:2]
-    first = [math.floor(float(at) / float(CELL * STEP) + 0.5) * STEP - CELLS // 2 for at in from_corner]
+    first = [math.floor(float(at) / float(edge * STEP) + 0.5) * STEP - cells // 2 for at in from_corner]
     return first[0], first[1]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,11 +15,12 @@ from safetensors.torch import load_file
 
 from baselines.cli.interruption import Interruption
 from entropy_explore_env.command import BAD_INPUT, INTERRUPTED
-from entropy_explore_env.prediction.crop import CELLS, FREE, OUTSIDE, PLANS, SOLID
+from entropy_explore_env.prediction.crop import CELL_M, CELLS, FREE, OUTSIDE, PLANS, SOLID
 from entropy_explore_env.prediction.predictor import shipped_predictor
 from entropy_explore_env.prediction.volumes import VOLUMES, VolumeWindow
 from entropy_explore_env.prediction.weights import read_network
 from training import map_predictor, map_samples
+from training.checkpoints import stored_arrays, stored_bytes
 from training.map_predictor import Args, drawn_batch, main, masked_loss, rate_at, run_command
 from training.map_samples import (
     RECIPES,
@@ -197,7 +199,8 @@ def test_the_shipped_weights_tell_rooms_from_rock_in_worlds_that_they_never_saw(
     validation = sampled_missions(RECIPES_HERE, "validation", 1, 3, 1)
     samples, recipes = read_samples(whole / "samples", validation)
     shipped = shipped_predictor().network
-    cells = scored(samples, recipes, predictions(shipped, PLANS, samples), nearest_shares(samples))
+    shares = nearest_shares(samples, CELL_M)
+    cells = scored(samples, recipes, CELL_M, predictions(shipped, PLANS, samples), shares)
     figures = figures_of(cells)
     for recipe in RECIPES_HERE:
         assert figures[recipe]["predicted_bits"] < 0.8 * figures[recipe]["base_rate_bits"], recipe
@@ -247,6 +250,11 @@ def test_a_folder_of_another_run_and_broken_files_are_refused(started, monkeypat
     file = started / "samples" / f"{missions('train')[0].name}.samples"
     content = file.read_bytes()
     file.write_bytes(content[:-200])
+    assert run(started) == BAD_INPUT
+    assert "remove that file, and it is made again" in capsys.readouterr().err
+    arrays = stored_arrays(zlib.decompress(content))
+    arrays["truth"] = arrays["truth"][:, 0]  # as an earlier version wrote it
+    file.write_bytes(zlib.compress(stored_bytes(arrays)))
     assert run(started) == BAD_INPUT
     file.write_bytes(content)
     assert "remove that file, and it is made again" in capsys.readouterr().err
@@ -303,17 +311,17 @@ def test_log_loss_and_calibration_by_hand():
 def test_the_nearest_measured_cell_by_hand():
     cells = np.zeros((1, 3, CELLS, CELLS), np.uint8)
     cells[0, SOLID, 3, 5], cells[0, FREE, 40, 5] = 252, 126
-    bins, near = nearest_bins(cells)
-    assert bins[0, 4, 5] == 1 and bins[0, 39, 5] == 0  # 0.2 m from solid, 0.2 m from free
-    assert bins[0, 3, 8] == 2 * 2 + 1 and bins[0, 43, 9] == 2 * 3  # 0.6 m, 1.0 m
-    assert near[0, 3, 25] and not near[0, 3, 26]  # 4.0 m, 4.2 m
+    bins, near = nearest_bins(cells, CELL_M)
+    assert bins[0, 0, 4, 5] == 1 and bins[0, 0, 39, 5] == 0  # 0.2 m from solid, 0.2 m from free
+    assert bins[0, 0, 3, 8] == 2 * 2 + 1 and bins[0, 0, 43, 9] == 2 * 3  # 0.6 m, 1.0 m
+    assert near[0, 0, 3, 25] and not near[0, 0, 3, 26]  # 4.0 m, 4.2 m
     truth = np.zeros((1, 1, CELLS, CELLS), bool)
     truth[0, 0, 4, 5] = True
     samples = Samples(cells, truth)
-    shares = nearest_shares(samples)
+    shares = nearest_shares(samples, CELL_M)
     assert shares[1] == pytest.approx((1 + 1) / (8 + 2))  # one of eight neighbours is solid
     assert shares[0] == pytest.approx(1 / 10)
-    found = scored(samples, np.array([2]), np.full(truth.shape, 0.25, np.float32), shares)
+    found = scored(samples, np.array([2]), CELL_M, np.full(truth.shape, 0.25, np.float32), shares)
     assert len(found.truth) == CELLS**2 - 2 and found.truth.sum() == 1
     figures = figures_of(found)
     assert set(figures) == {"all", "near", RECIPES[2]} and figures["near"]["cells"] == found.near.sum()
@@ -323,5 +331,15 @@ def test_the_nearest_measured_cell_by_hand():
 
 
 def test_nothing_measured_at_all_is_far_from_everything():
-    bins, near = nearest_bins(np.zeros((1, 3, CELLS, CELLS), np.uint8))
+    bins, near = nearest_bins(np.zeros((1, 3, CELLS, CELLS), np.uint8), CELL_M)
     assert (bins == 12).all() and not near.any()
+
+
+def test_the_nearest_measured_cell_may_lie_in_another_layer():
+    cells = np.zeros((1, 65, 64, 64), np.uint8)
+    cells[0, 3, 10, 20], cells[0, 32 + 30, 50, 20] = 252, 252
+    bins, near = nearest_bins(cells, 0.4)
+    assert (
+        bins[0, 4, 10, 20] == 2 * 1 + 1 and bins[0, 28, 50, 20] == 2 * 2
+    )  # 0.4 m from solid, 0.8 m from free
+    assert near[0, 13, 10, 20] and not near[0, 14, 10, 20]  # 4.0 m, 4.4 m

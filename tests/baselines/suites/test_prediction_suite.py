@@ -11,6 +11,8 @@ from baselines.suites import find_suite, prediction
 from baselines.suites.results import Results
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.missions.foresight import predictions_pay
+from entropy_explore_env.prediction.volumes import VOLUMES
+from entropy_explore_env.prediction.weights import features_of
 from entropy_explore_env.settings.changes import with_settings
 from entropy_explore_env.settings.scenarios import SCENARIOS
 from tests.prediction.networks import file_bytes, random_tensors
@@ -52,6 +54,21 @@ def test_a_recipe_is_left_out_by_weights_that_the_training_command_wrote(tmp_pat
         SuiteMission()(env, name, 3)["entropy_end_bits"] for name in (prediction.LEFT_OUT, "planned-rate")
     ]
     assert ends[0] != ends[1]
+
+
+def test_recipes_of_volumes_are_left_out_by_weights_for_volumes(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    cave = with_settings(SCENARIOS["cave"], {"robots": 1, "ending": {"time_limit_s": 10.0}})
+    strategy, rng = prediction.LeftOut(), np.random.default_rng(0)
+    with pytest.raises(SettingError, match="--recipes cave office-3d --leave-out cave --out runs"):
+        strategy.reset(cave, rng)
+    file = tmp_path / "runs" / "without-cave" / "predictor.safetensors"
+    file.parent.mkdir(parents=True)
+    file.write_bytes(file_bytes(random_tensors()))
+    with pytest.raises(SettingError, match="cell_m"):
+        strategy.reset(cave, rng)
+    file.write_bytes(file_bytes(random_tensors(form=VOLUMES), features_of(VOLUMES)))
+    assert SuiteMission()(scripted_env(cave), prediction.LEFT_OUT, 3)["scans"] > 1
 
 
 def test_missions_of_all_planners_differ():
