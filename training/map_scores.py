@@ -23,7 +23,7 @@ from scipy.ndimage import distance_transform_edt
 from entropy_explore_env.prediction.crop import OUTSIDE, SOLID
 from entropy_explore_env.prediction.predictor import new_predicting
 from entropy_explore_env.prediction.unet import Form, Network, fill_unmeasured, infer
-from training.map_samples import RECIPES, Samples, as_channels, as_plans, unmeasured
+from training.map_samples import RECIPES, STEPS, Samples, as_channels, as_plans, unmeasured
 
 BINS = 10
 _EDGES_M = np.array([0.3, 0.5, 0.9, 1.7, 3.3, 6.5])
@@ -71,6 +71,9 @@ def nearest_bins(cells: np.ndarray, cell_m: float) -> tuple[np.ndarray, np.ndarr
     bins, near = np.full((len(cells), layers, *cells.shape[2:]), 2 * len(_EDGES_M), np.int64), []
     for number, sample in enumerate(cells):
         measured = (sample[:layers] > 0) | (sample[layers : 2 * layers] > 0)
+        inside = sample[2 * layers] == 0
+        above = (sample[:layers] == STEPS)[:, inside].all(axis=1)  # layers over the workspace count as solid
+        measured[above] = False
         near.append(measured)
         if not measured.any():
             continue
@@ -222,7 +225,7 @@ def draw_figure(
 def _half_seen(samples: Samples, those: np.ndarray) -> int:
     """Return the sample of which the largest share is unmeasured, among those at most 0.4 of which are.
 
-    Some of it is free: a layer of a volume may hold rock alone.
+    Layers of a volume that hold rock alone are left out.
     """
     those = those[~samples.truth[those].all(axis=(1, 2, 3))]
     shares = unmeasured(samples.cells[those]).mean(axis=(1, 2, 3))

@@ -8,6 +8,7 @@ plans as the planner does.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -112,7 +113,7 @@ class LeftOut(PlannedRate):
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""
-        recipe = str(scenario.world).split("-")[0]
+        recipe = re.sub(r"-\d+$", "", str(scenario.world))  # dungeons have a number
         file = Path("runs") / f"without-{recipe}" / "predictor.safetensors"
         if not file.is_file():
             recipes = "" if scenario.grid.flat else "--recipes cave office-3d "

@@ -39,10 +39,10 @@ UNPREDICTED; what it says of known voxels does not count. None = nothing is pred
 def predictions_pay(scenario: Scenario) -> bool:
     """Return whether predictions pay in missions that end when a map is known.
 
-    They do for ground robots that see all around, in plans, and for flying ones with a narrow view on planned
-    paths, in volumes in which a prediction is quick; for both where they decide at stops. Missions that end
-    when enough is seen took as long, even with the true map in place of the prediction; robots that decide
-    under way turned back too often.
+    They do if all robots decide at stops: in plans, ground robots that see all around; in volumes that are
+    not too large, flying ones with a narrow view on planned paths. Missions that end when enough is seen took
+    as long, even with the true map in place of the prediction; robots that decide under way turned back too
+    often.
     """
     return not scenario.ending.by_seen and all(_pay_for(scenario, kind) for kind in scenario.kinds)
 

@@ -34,6 +34,8 @@ SOLID, FREE, OUTSIDE = range(len(CHANNELS))
 
 ROUNDING = 1e-6
 """A cell and a voxel overlap by more than this share of a cell; what is a multiple but for less, is one."""
+_FARTHEST_M = 1e12
+"""Numbers of cells farther off would not be whole any more."""
 _COVERED = 0.5
 """What was measured is covered above this coverage."""
 
@@ -184,8 +186,10 @@ def around(
         if not np.isfinite(numbers).all():
             raise SettingError(name, "a number that is not finite", "finite numbers alone")
     there = np.asarray(place_m, np.float64)[:3]
-    if there.shape != (3,) or not np.isfinite(there).all():
+    if there.shape != (3,) or not (np.abs(there) < _FARTHEST_M).all():
         raise SettingError("place_m", place_m, "x, y and z, finite")
+    if not 0.0 < sigma_prior < math.inf:
+        raise SettingError("sigma_prior", sigma_prior, "a finite number above 0")
     belief = Belief(
         grid.shape,
         grid.voxel_size_m,

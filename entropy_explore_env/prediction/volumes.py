@@ -59,15 +59,15 @@ def volume_window(belief, place):
 
 @lean_kernel
 def pool_volume(belief, window, cells, solid):
-    """Tell of each cell of a crop what is measured.
+    """Fill in what was measured of each cell of a crop.
 
     Args:
         belief: Belief.
         window: VolumeWindow.
         cells: (2·L + 1, N, N) float32, filled in: shares of voxels covered and free in each layer; 1 outside
             the workspace.
-        solid: (L, N, N) float32, filled in: -1 where nothing was measured, else what `count_measured` says; 1
-            outside the workspace.
+        solid: (L, N, N) float32, filled in: the largest expected coverage that was measured; -1 where
+            nothing was, 1 outside the workspace.
     """
     per_cell, size = _CELL_M / belief.voxel_size_m, belief.size
     for i in range(_CELLS):
@@ -90,7 +90,7 @@ def pool_volume(belief, window, cells, solid):
 
 @lean_kernel
 def spread(belief, window, cells, solid, out):
-    """Fill in (V,) what is predicted of each voxel: that of its cell where nothing of that was measured."""
+    """Fill in (V,) the probability of each voxel: its cell's, where nothing of the cell was measured."""
     size, per_voxel = belief.size, belief.voxel_size_m / _CELL_M
     out[:] = UNPREDICTED
     for x in range(size[0]):
@@ -148,11 +148,11 @@ class VolumePredictor:
             place_m: (3,) x, y, z, map frame; further numbers do not count.
 
         Returns:
-            (X, Y, Z) float32, read-only: the probability of each voxel to be solid; UNPREDICTED of those that
-            were measured, or lie outside of the crop.
+            (X, Y, Z) float32, read-only: the probability of each voxel to be solid. It is UNPREDICTED, -1, of
+            voxels that were measured, that share a cell with one that was, or that lie outside of the crop.
 
         Raises:
-            SettingError: The grid is flat, the belief is not of the grid, or a number is not finite.
+            SettingError: The grid is flat, the belief is not of the grid, or a number is out of its range.
         """
         if grid.flat:
             raise SettingError("Grid.shape", grid.shape, "several layers of voxels: `Predictor` is for plans")

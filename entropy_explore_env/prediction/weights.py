@@ -64,9 +64,12 @@ def check_form(network: Network, form: Form) -> None:
     layers = {"head": network.head}
     for part in ("first", "second", "lift", "merge"):
         layers |= {f"{part}.{level}": layer for level, layer in enumerate(getattr(network, part))}
-    shapes = {name: layer.weights.shape for name, layer in layers.items()}
-    if shapes != layer_shapes(form):
-        raise SettingError("network", shapes, f"a network for crops of {counted(form.layers, 'layer')}")
+    for name, shape in layer_shapes(form).items():
+        numbers = layers[name]
+        given = (numbers.weights.shape, numbers.bias.shape, numbers.weights.dtype, numbers.bias.dtype)
+        if given != (shape, shape[:1], np.float32, np.float32):
+            allowed = f"float32 of {shape}, as networks for crops of {counted(form.layers, 'layer')} have"
+            raise SettingError(f"network: {name}", given, allowed)
 
 
 def _tensor_shapes(form: Form) -> dict[str, tuple[int, ...]]:
@@ -105,7 +108,9 @@ def _check_features(file: Path, said: object, form: Form) -> None:
     theirs = {"layers": "1", **said}
     for name, ours in features_of(form).items():
         if theirs.get(name) != ours:
-            allowed = f"{ours!r}: these weights are of other crops than this library's"
+            allowed = (
+                f"{ours!r}: these weights are for other crops; plans and volumes have weights of their own"
+            )
             raise SettingError(f"{file}: {name}", said.get(name), allowed)
 
 

@@ -152,7 +152,8 @@ class RobotKnowledge:
         """What is predicted of the voxels around the robot, as of the first look at it.
 
         (X, Y, Z) float32, read-only: the probability to be solid, by the predictor of volumes that comes with
-        the library; `prediction.crop.UNPREDICTED` of voxels that were measured or are farther away.
+        the library. It is -1 of voxels that were measured, that share a cell of 0.4 m with one that was, or
+        that lie outside of the crop of 25.6 × 25.6 × 12.8 m.
 
         Raises:
             SettingError: The map is a plan, or holds a number that is not finite.

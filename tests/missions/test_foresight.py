@@ -163,7 +163,7 @@ def test_a_volume_is_predicted_where_much_of_it_is_solid():
         view = view_of(None, voxel_size_m, predicted.shape)
         view.predicted_volume = predicted
         found = LearnedForesight()(view).reshape(predicted.shape)
-        across = max(0.4 / voxel_size_m, 1.0)  # of so many voxels one stops as often as the cell
+        across = max(0.4 / voxel_size_m, 1.0)  # one of these voxels stops a ray as often as the cell
         np.testing.assert_allclose(found[:2], 1.0 - (1.0 - predicted[:2]) ** (1.0 / across), atol=1e-6)
         assert (found[2] == UNPREDICTED).all()
     view.predicted_volume = predicted - np.float32(0.1) * (predicted > 0.0)

@@ -103,9 +103,14 @@ def test_memory_of_earlier_crops_changes_no_bit(predictor):
     assert np.array_equal(found[0], found[2]) and not np.array_equal(found[0], found[1])
 
 
-def test_a_belief_with_a_number_that_is_none_is_refused(predictor):
+def test_numbers_out_of_range_are_refused(predictor):
     grid = Grid((8, 7, 6), 0.4)
     mean, precision, _ = drawn_belief(grid.shape, 1)
+    for sigma_prior in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(SettingError, match="sigma_prior"):
+            predictor.predict(grid, mean, precision, sigma_prior, np.ones(3))
+    with pytest.raises(SettingError, match="place_m"):
+        predictor.predict(grid, mean, precision, SIGMA_PRIOR, np.full(3, 1e300))
     mean[3, 2, 1] = np.nan
     with pytest.raises(SettingError, match="mean"):
         predictor.predict(grid, mean, precision, SIGMA_PRIOR, np.ones(3))
@@ -115,7 +120,11 @@ def test_plans_and_networks_of_plans_are_refused(predictor):
     grid = Grid((8, 7, 1), 0.4)
     with pytest.raises(SettingError, match="several layers of voxels"):
         predictor.predict(grid, *drawn_belief(grid.shape, 1)[:2], SIGMA_PRIOR, np.ones(3))
-    with pytest.raises(SettingError, match="a network for crops of 32 layers"):
+    with pytest.raises(SettingError, match=r"first\.0 .* networks for crops of 32 layers"):
         VolumePredictor(shipped_predictor().network)
-    with pytest.raises(SettingError, match="a network for crops of 1 layer"):
+    with pytest.raises(SettingError, match=r"first\.0 .* networks for crops of 1 layer"):
         Predictor(predictor.network)
+    head = predictor.network.head
+    for wrong in (head._replace(bias=head.bias[:1]), head._replace(weights=head.weights.astype(float))):
+        with pytest.raises(SettingError, match="head"):
+            VolumePredictor(predictor.network._replace(head=wrong))

@@ -337,9 +337,10 @@ def test_nothing_measured_at_all_is_far_from_everything():
 
 def test_the_nearest_measured_cell_may_lie_in_another_layer():
     cells = np.zeros((1, 65, 64, 64), np.uint8)
-    cells[0, 3, 10, 20], cells[0, 32 + 30, 50, 20] = 252, 252
+    cells[0, 3, 10, 20], cells[0, 32 + 28, 50, 20] = 252, 252
+    cells[0, 30:32] = 252  # over the workspace
     bins, near = nearest_bins(cells, 0.4)
     assert (
-        bins[0, 4, 10, 20] == 2 * 1 + 1 and bins[0, 28, 50, 20] == 2 * 2
+        bins[0, 4, 10, 20] == 2 * 1 + 1 and bins[0, 26, 50, 20] == 2 * 2
     )  # 0.4 m from solid, 0.8 m from free
     assert near[0, 13, 10, 20] and not near[0, 14, 10, 20]  # 4.0 m, 4.4 m
