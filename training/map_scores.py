@@ -20,9 +20,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
+from baselines.experiments.plots import png
 from entropy_explore_env.prediction.crop import OUTSIDE, SOLID
 from entropy_explore_env.prediction.predictor import new_predicting
 from entropy_explore_env.prediction.unet import Form, Network, fill_unmeasured, infer
+from entropy_explore_env.writing import write_atomically
 from training.map_samples import RECIPES, STEPS, Samples, as_channels, as_plans, unmeasured
 
 BINS = 10
@@ -219,7 +221,7 @@ def draw_figure(
             diagram.plot(table[:, 0], table[:, 1], marker=".", label=name)
     diagram.set(xlabel="predicted probability", ylabel="share of solid cells", aspect="equal")
     diagram.legend(frameon=False)
-    figure.savefig(file, dpi=90)
+    write_atomically(file, png(figure))
 
 
 def _half_seen(samples: Samples, those: np.ndarray) -> int:
