@@ -51,13 +51,12 @@ from entropy_explore_env.writing import write_atomically
 from training.map_samples import (
     PLAN_RECIPES,
     RECIPES,
-    STEPS,
     Samples,
+    drawn_batch,
     form_of,
     make_samples,
     read_samples,
     sampled_missions,
-    unmeasured,
 )
 from training.map_scores import draw_figure, figures_of, nearest_shares, predictions, scored, table_text
 
@@ -114,12 +113,17 @@ class Args(WorkerOptions):
     json: bool = False
     """Print one JSON object and nothing else."""
 
+    @property
+    def form(self) -> Form:
+        """What the network is."""
+        return form_of(self.recipes[0])
+
 
 def main(words: Sequence[str]) -> int:
     """Run the command."""
     args = parse(Args, words, description=__doc__)
     check(args)
-    form = form_of(args.recipes[0])
+    form = args.form
     network = None if args.weights is None else read_network(args.weights, form)
     workers = args.workers
     make_folder("out", args.out)
@@ -251,27 +255,6 @@ def masked_loss(logits: torch.Tensor, truth: torch.Tensor, asked: torch.Tensor) 
     return (losses * asked).sum() / asked.sum().clamp(min=1.0)
 
 
-def drawn_batch(
-    cells: torch.Tensor, truth: torch.Tensor, chosen: torch.Tensor, rng: np.random.Generator
-) -> list[torch.Tensor]:
-    """Return channels, truth and what is asked for of some samples, all turned and mirrored in one way.
-
-    Args:
-        cells: (N, 2·L + 1, C, C) uint8 of all samples; like all tensors on the device for learning.
-        truth: (N, L, C, C) bool.
-        chosen: (B,) int64, numbers of samples.
-        rng: Draws turn and mirroring.
-    """
-    turns, mirrored = int(rng.integers(4)), bool(rng.integers(2))
-    batch = []
-    for values in (cells[chosen], truth[chosen]):
-        turned = torch.rot90(values, turns, dims=(-2, -1))
-        batch.append(turned.transpose(-2, -1) if mirrored else turned)
-    drawn, solid = batch
-    channels = (drawn.float() / STEPS).contiguous(memory_format=torch.channels_last)
-    return [channels, solid.float().contiguous(), unmeasured(drawn).float().contiguous()]
-
-
 def rate_at(args: Args, step: int, steps: int) -> float:
     """Return the learning rate: a linear rise, then half a cosine down to 0."""
     share = (step + 1) / steps
@@ -284,7 +267,7 @@ def train(args: Args, samples: Samples, interruption: Interruption) -> UNet | No
     """Return a trained network, the moving average of its weights; None if Ctrl-C stopped that."""
     torch.set_num_threads(args.threads)
     torch.manual_seed(args.seed)
-    device, model = device_of(args), UNet(form_of(args.recipes[0]))
+    device, model = device_of(args), UNet(args.form)
     model.to(device, memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue] - twice as fast
     cells, truth = (torch.from_numpy(values).to(device) for values in samples)
     optimiser = torch.optim.AdamW(model.parameters(), lr=args.rate, weight_decay=_DECAY)
@@ -352,9 +335,7 @@ def _training_file(args: Args) -> Path:
 
 def _origin(args: Args) -> str:
     """Return the options that determine the weights, as JSON."""
-    return json.dumps(
-        {name: getattr(args, name) for name in _OPTIONS} | features_of(form_of(args.recipes[0]))
-    )
+    return json.dumps({name: getattr(args, name) for name in _OPTIONS} | features_of(args.form))
 
 
 def _taken_up(args: Args) -> tuple[int, dict[str, torch.Tensor]]:

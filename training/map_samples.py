@@ -111,7 +111,7 @@ def scenario_of(sampled: Sampled, rng: np.random.Generator) -> Scenario:
     if rng.random() < 0.5:
         changes["robot"] = {"redecide": "on_scan"}
         changes["sensor"]["scan_every_m"] = 1.0
-    if sampled.recipe in VOLUME_RECIPES:  # robots there stay as they are
+    if sampled.recipe in VOLUME_RECIPES:  # all recipes have the same draws
         alone = {name: changes[name] for name in ("robots", "split", "ending")}
         return with_settings(SCENARIOS[sampled.recipe], alone)
     voxel_size_m, scale = float(rng.choice(_VOXELS_M)), float(rng.choice(_SCALES))
@@ -212,13 +212,9 @@ def read_samples(folder: Path, missions: Iterable[Sampled]) -> tuple[Samples, np
         try:
             arrays = stored_arrays(zlib.decompress(file.read_bytes()))
             truth = np.unpackbits(arrays["truth"], axis=-1).astype(bool)
-            form = form_of(sampled.recipe)
-            square = (form.cells, form.cells)
-            if truth.shape[1:] != (form.layers, *square) or arrays["cells"].shape != (
-                len(truth),
-                form.channels,
-                *square,
-            ):
+            form, count = form_of(sampled.recipe), len(truth)
+            parts = (arrays["cells"], form.channels), (truth, form.layers)
+            if any(part.shape != (count, planes, form.cells, form.cells) for part, planes in parts):
                 raise ValueError(f"samples of another form in {file}")
         except (OSError, ValueError, KeyError, EOFError, zlib.error, io.UnsupportedOperation):
             allowed = "samples that this command wrote: remove that file, and it is made again"
@@ -236,15 +232,27 @@ def unmeasured(cells: _Numbers) -> _Numbers:
     return nothing & (cells[:, 2 * layers :] == 0)  # pyright: ignore[reportReturnType] - arrays and tensors
 
 
-def as_plans(samples: Samples) -> Samples:
-    """Return each layer of samples as a sample of one layer."""
-    layers = samples.truth.shape[1]
-    solid, free = samples.cells[:, :layers], samples.cells[:, layers : 2 * layers]
-    outside = np.broadcast_to(samples.cells[:, 2 * layers :], solid.shape)
-    cells = np.stack([solid, free, outside], axis=2).reshape(-1, 3, *solid.shape[2:])
-    return Samples(cells, samples.truth.reshape(-1, 1, *solid.shape[2:]))
-
-
 def as_channels(cells: np.ndarray) -> np.ndarray:
     """Return kept channels as the network reads them, float32."""
     return cells.astype(np.float32) / np.float32(STEPS)
+
+
+def drawn_batch(
+    cells: torch.Tensor, truth: torch.Tensor, chosen: torch.Tensor, rng: np.random.Generator
+) -> list[torch.Tensor]:
+    """Return channels, truth and what is asked for of some samples, all turned and mirrored in one way.
+
+    Args:
+        cells: (N, 2·L + 1, C, C) uint8 of all samples; like all tensors on the device for learning.
+        truth: (N, L, C, C) bool.
+        chosen: (B,) int64, numbers of samples.
+        rng: Draws turn and mirroring.
+    """
+    turns, mirrored = int(rng.integers(4)), bool(rng.integers(2))
+    batch = []
+    for values in (cells[chosen], truth[chosen]):
+        turned = torch.rot90(values, turns, dims=(-2, -1))
+        batch.append(turned.transpose(-2, -1) if mirrored else turned)
+    drawn, solid = batch
+    channels = (drawn.float() / STEPS).contiguous(memory_format=torch.channels_last)
+    return [channels, solid.float().contiguous(), unmeasured(drawn).float().contiguous()]

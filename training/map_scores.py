@@ -25,7 +25,7 @@ from entropy_explore_env.prediction.crop import OUTSIDE, SOLID
 from entropy_explore_env.prediction.predictor import new_predicting
 from entropy_explore_env.prediction.unet import Form, Network, fill_unmeasured, infer
 from entropy_explore_env.writing import write_atomically
-from training.map_samples import RECIPES, STEPS, Samples, as_channels, as_plans, unmeasured
+from training.map_samples import RECIPES, STEPS, Samples, as_channels, unmeasured
 
 BINS = 10
 _EDGES_M = np.array([0.3, 0.5, 0.9, 1.7, 3.3, 6.5])
@@ -174,6 +174,15 @@ def table_text(figures: dict[str, Any], left_out: str | None) -> str:
             f"{shown:<22}{row['cells']:>10,}{row['solid']:>8.3f}{bits}{row['calibration_error']:>8.4f}"
         )
     return "\n".join([*lines, "log loss in bits a cell; ECE = expected calibration error"])
+
+
+def as_plans(samples: Samples) -> Samples:
+    """Return each layer of samples as a sample of one layer."""
+    layers = samples.truth.shape[1]
+    solid, free = samples.cells[:, :layers], samples.cells[:, layers : 2 * layers]
+    outside = np.broadcast_to(samples.cells[:, 2 * layers :], solid.shape)
+    cells = np.stack([solid, free, outside], axis=2).reshape(-1, 3, *solid.shape[2:])
+    return Samples(cells, samples.truth.reshape(-1, 1, *solid.shape[2:]))
 
 
 def draw_figure(

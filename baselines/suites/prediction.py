@@ -23,8 +23,8 @@ from baselines.suites.suite import PATH, QUICK_STARTS, STARTS, TIME, Place, Task
 from entropy_explore_env.envs.parallel_env import EntropyExploreEnv
 from entropy_explore_env.errors import SettingError
 from entropy_explore_env.explorer.planned_rate import LearnedForesight, PlannedRate
-from entropy_explore_env.prediction.predictor import Predictor, read_predictor
-from entropy_explore_env.prediction.volumes import VolumePredictor, read_volume_predictor
+from entropy_explore_env.prediction.predictor import MapPredictor, Prediction, read_predictor
+from entropy_explore_env.prediction.volumes import read_volume_predictor
 from entropy_explore_env.robots.knowledge import RobotKnowledge
 from entropy_explore_env.settings.scenario import Scenario
 from entropy_explore_env.settings.scenarios import SCENARIOS
@@ -109,7 +109,7 @@ class LeftOut(PlannedRate):
     def __init__(self) -> None:
         """Wait for the mission's recipe."""
         super().__init__(foresight=lambda: LearnedForesight(self._predictor))
-        self._predictor: Predictor | VolumePredictor | None = None
+        self._predictor: MapPredictor[Prediction | np.ndarray] | None = None
 
     def reset(self, scenario: Scenario, rng: np.random.Generator) -> None:
         """Begin a mission."""

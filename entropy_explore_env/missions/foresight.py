@@ -24,8 +24,8 @@ from entropy_explore_env.planner.thresholds import (
     TO_AND_FRO,
 )
 from entropy_explore_env.prediction.crop import ROUNDING, UNPREDICTED
-from entropy_explore_env.prediction.predictor import Prediction, Predictor
-from entropy_explore_env.prediction.volumes import VOLUMES, VolumePredictor
+from entropy_explore_env.prediction.predictor import MapPredictor, Prediction
+from entropy_explore_env.prediction.volumes import VOLUMES
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
@@ -65,7 +65,7 @@ class LearnedForesight:
     where those of one opening change with its place, it would do so for good.
     """
 
-    def __init__(self, predictor: Predictor | VolumePredictor | None = None) -> None:
+    def __init__(self, predictor: MapPredictor[Prediction | np.ndarray] | None = None) -> None:
         """Begin a mission; without a predictor, take that of the library for plans or for volumes."""
         self._predictor = predictor
         self._latest: dict[int, _Predicted] = {}
@@ -88,14 +88,13 @@ class LearnedForesight:
         return latest.solid
 
     def _predicted(self, view: RobotView) -> np.ndarray | None:
-        predictor = self._predictor
-        if isinstance(predictor, VolumePredictor):
-            return _solid_volume(view, view.volume_predicted_by(predictor))
-        if predictor is not None:
-            return _solid_plan(view, view.predicted_by(predictor))
-        if view.scenario.grid.flat:
-            return _solid_plan(view, view.prediction)
-        return _solid_volume(view, view.predicted_volume)
+        if self._predictor is not None:
+            predicted = view.predicted_by(self._predictor)
+        else:
+            predicted = view.prediction if view.scenario.grid.flat else view.predicted_volume
+        if isinstance(predicted, np.ndarray):
+            return _solid_volume(view, predicted)
+        return _solid_plan(view, predicted)
 
     def _goes_to_and_fro(self, view: RobotView) -> bool:
         """Return whether a robot drove far in its last decisions, and stayed in a small part of the world."""

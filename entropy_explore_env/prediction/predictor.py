@@ -8,10 +8,11 @@ terrain it was never tried.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from entropy_explore_env.prediction.crop import (
     CELLS,
     PLANS,
     ROUNDING,
+    Around,
     Window,
     around,
     pool_cells,
@@ -38,6 +40,9 @@ from entropy_explore_env.prediction.unet import (
 from entropy_explore_env.prediction.weights import SHIPPED, check_form, read_network
 from entropy_explore_env.settings.grid import Grid
 from entropy_explore_env.settings.observation import Observation
+
+Predicted = TypeVar("Predicted", covariant=True)
+"""What a MapPredictor returns."""
 
 
 class Predicting(NamedTuple):
@@ -112,16 +117,19 @@ class Prediction:
         return f"Prediction({size}, {share:.1%} measured)"
 
 
-class Predictor:
-    """A network that predicts what was never measured."""
+class MapPredictor(ABC, Generic[Predicted]):
+    """A network that predicts what was never measured around a place."""
+
+    form: ClassVar[Form]
+    """What its network is."""
 
     def __init__(self, network: Network) -> None:
-        """Take the network: see `read_predictor` and `shipped_predictor`.
+        """Take a network that `read_network` read.
 
         Raises:
-            SettingError: It is not one for plans.
+            SettingError: It is of another form.
         """
-        check_form(network, PLANS)
+        check_form(network, self.form)
         self.network = network
 
     def predict(
@@ -132,10 +140,8 @@ class Predictor:
         sigma_prior: float,
         place_m: np.ndarray,
         body_radius_m: float,
-    ) -> Prediction:
-        """Predict around a place.
-
-        A workspace smaller than the crop is predicted as it is: the cells around it are outside.
+    ) -> Predicted:
+        """Predict around a place; a workspace smaller than the crop is predicted as it is.
 
         Args:
             grid: Of the belief.
@@ -143,13 +149,26 @@ class Predictor:
             precision: (X, Y, Z) float32, 1/σ² of it.
             sigma_prior: σ of voxels that were never measured.
             place_m: (3,) x, y, z, map frame; further numbers do not count.
-            body_radius_m: The band of heights reaches so far above and below the place.
+            body_radius_m: The band of heights of a plan reaches so far above and below the place.
 
         Raises:
-            SettingError: The belief is not of the grid, or a number is not finite.
+            SettingError: The belief is not of the grid, a number is out of its range, or nothing can be
+                predicted in such a grid.
         """
         there = around(grid, mean, precision, sigma_prior, place_m, body_radius_m)
-        predicting = new_predicting(self.network)
+        return self._predicted(grid, there, new_predicting(self.network, self.form))
+
+    @abstractmethod
+    def _predicted(self, grid: Grid, there: Around, predicting: Predicting) -> Predicted:
+        """Return what is predicted around a place, with memory that is used once."""
+
+
+class Predictor(MapPredictor[Prediction]):
+    """A predictor of plans; cells around a workspace smaller than the crop are outside."""
+
+    form = PLANS
+
+    def _predicted(self, grid: Grid, there: Around, predicting: Predicting) -> Prediction:
         window = Window(*predict_cells(predicting, there.belief, there.place, there.radius))
         measured = predicting.cells[:2].max(axis=0) > 0.0
         origin_m = np.asarray(grid.origin_m)[:2] + CELL_M * np.array([window.x, window.y])

@@ -21,14 +21,13 @@ from entropy_explore_env.prediction.crop import (
     ROUNDING,
     UNPREDICTED,
     Around,
-    around,
     count_measured,
     first_cell,
     overlapped,
 )
-from entropy_explore_env.prediction.predictor import new_predicting
-from entropy_explore_env.prediction.unet import Form, Network, fill_unmeasured, infer
-from entropy_explore_env.prediction.weights import LEARNED, check_form, read_network
+from entropy_explore_env.prediction.predictor import MapPredictor, Predicting
+from entropy_explore_env.prediction.unet import Form, fill_unmeasured, infer
+from entropy_explore_env.prediction.weights import LEARNED, read_network
 from entropy_explore_env.settings.grid import Grid
 
 VOLUMES = Form(64, 32, 0.4, (16, 32, 40, 40))
@@ -118,47 +117,19 @@ def predict_volume(predicting, belief, place, out):
     spread(belief, window, predicting.cells, predicting.solid, out)
 
 
-class VolumePredictor:
-    """A network that predicts what was never measured in a volume."""
+class VolumePredictor(MapPredictor[np.ndarray]):
+    """A predictor of volumes, at all heights.
 
-    def __init__(self, network: Network) -> None:
-        """Take the network: see `read_volume_predictor` and `shipped_volume_predictor`.
+    It returns (X, Y, Z) float32, read-only: the probability of each voxel to be solid. That is UNPREDICTED,
+    -1, of voxels that were measured, that share a cell with one that was, or that lie outside of the crop.
+    """
 
-        Raises:
-            SettingError: It is not one for volumes.
-        """
-        check_form(network, VOLUMES)
-        self.network = network
+    form = VOLUMES
 
-    def predict(
-        self,
-        grid: Grid,
-        mean: np.ndarray,
-        precision: np.ndarray,
-        sigma_prior: float,
-        place_m: np.ndarray,
-    ) -> np.ndarray:
-        """Predict around a place; a workspace smaller than the crop is predicted as it is.
-
-        Args:
-            grid: Of the belief, which is no plan.
-            mean: (X, Y, Z) float32, expected coverage.
-            precision: (X, Y, Z) float32, 1/σ² of it.
-            sigma_prior: σ of voxels that were never measured.
-            place_m: (3,) x, y, z, map frame; further numbers do not count.
-
-        Returns:
-            (X, Y, Z) float32, read-only: the probability of each voxel to be solid. It is UNPREDICTED, -1, of
-            voxels that were measured, that share a cell with one that was, or that lie outside of the crop.
-
-        Raises:
-            SettingError: The grid is flat, the belief is not of the grid, or a number is out of its range.
-        """
+    def _predicted(self, grid: Grid, there: Around, predicting: Predicting) -> np.ndarray:
         if grid.flat:
             raise SettingError("Grid.shape", grid.shape, "several layers of voxels: `Predictor` is for plans")
-        there = around(grid, mean, precision, sigma_prior, place_m, 0.0)
-        predicting = new_predicting(self.network, VOLUMES)
-        out = np.empty(there.belief.size, np.float32)
+        out = np.empty(grid.shape, np.float32)
         predict_volume(predicting, there.belief, there.place, out.reshape(-1))
         out.setflags(write=False)
         return out

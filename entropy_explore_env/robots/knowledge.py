@@ -11,8 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from entropy_explore_env.prediction.predictor import Prediction, Predictor, shipped_predictor
-from entropy_explore_env.prediction.volumes import VolumePredictor, shipped_volume_predictor
+from entropy_explore_env.prediction.predictor import MapPredictor, Predicted, Prediction, shipped_predictor
+from entropy_explore_env.prediction.volumes import shipped_volume_predictor
 from entropy_explore_env.robots.motion import MoveEnd
 from entropy_explore_env.settings.robot_kind import RobotKind
 from entropy_explore_env.settings.scenario import Scenario
@@ -141,8 +141,8 @@ class RobotKnowledge:
         """
         return self.predicted_by(shipped_predictor())
 
-    def predicted_by(self, predictor: Predictor) -> Prediction:
-        """Return what a predictor says of the cells around the robot: see `prediction`."""
+    def predicted_by(self, predictor: MapPredictor[Predicted]) -> Predicted:
+        """Return what a predictor says around the robot: see `prediction` and `predicted_volume`."""
         grid, radius_m = self.scenario.grid, self.kind.robot.body_radius_m
         known = (self.mean, self.precision, self.scenario.sigma_prior)
         return predictor.predict(grid, *known, self.pose, radius_m)
@@ -158,12 +158,7 @@ class RobotKnowledge:
         Raises:
             SettingError: The map is a plan, or holds a number that is not finite.
         """
-        return self.volume_predicted_by(shipped_volume_predictor())
-
-    def volume_predicted_by(self, predictor: VolumePredictor) -> np.ndarray:
-        """Return what a predictor says of the voxels around the robot: see `predicted_volume`."""
-        known = (self.mean, self.precision, self.scenario.sigma_prior)
-        return predictor.predict(self.scenario.grid, *known, self.pose)
+        return self.predicted_by(shipped_volume_predictor())
 
     @property
     def planar(self) -> bool:

@@ -80,7 +80,7 @@ def test_voxels_are_predicted_by_the_cell_of_their_centre(predictor, shape, voxe
     first = volume_window(there.belief, there.place)
     cells, unknown = reference.volume_channels(mean, measured, voxel, first)
     solid = 1.0 / (1.0 + np.exp(-reference.logits(random_tensors(form=VOLUMES), cells)))
-    found = predictor.predict(grid, mean, precision, SIGMA_PRIOR, in_the_middle(grid))
+    found = predictor.predict(grid, mean, precision, SIGMA_PRIOR, in_the_middle(grid), 0.0)
     expected = np.full(shape, UNPREDICTED)
     for at in np.ndindex(*shape):
         i, j, k = (
@@ -99,7 +99,7 @@ def test_memory_of_earlier_crops_changes_no_bit(predictor):
     grid = Grid((40, 30, 12), 0.4)
     beliefs = [drawn_belief(grid.shape, seed)[:2] for seed in (1, 2, 1)]
     place_m = np.array([8.0, 6.0, 2.0])
-    found = [predictor.predict(grid, *each, SIGMA_PRIOR, place_m) for each in beliefs]
+    found = [predictor.predict(grid, *each, SIGMA_PRIOR, place_m, 0.0) for each in beliefs]
     assert np.array_equal(found[0], found[2]) and not np.array_equal(found[0], found[1])
 
 
@@ -108,18 +108,18 @@ def test_numbers_out_of_range_are_refused(predictor):
     mean, precision, _ = drawn_belief(grid.shape, 1)
     for sigma_prior in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(SettingError, match="sigma_prior"):
-            predictor.predict(grid, mean, precision, sigma_prior, np.ones(3))
+            predictor.predict(grid, mean, precision, sigma_prior, np.ones(3), 0.0)
     with pytest.raises(SettingError, match="place_m"):
-        predictor.predict(grid, mean, precision, SIGMA_PRIOR, np.full(3, 1e300))
+        predictor.predict(grid, mean, precision, SIGMA_PRIOR, np.full(3, 1e300), 0.0)
     mean[3, 2, 1] = np.nan
     with pytest.raises(SettingError, match="mean"):
-        predictor.predict(grid, mean, precision, SIGMA_PRIOR, np.ones(3))
+        predictor.predict(grid, mean, precision, SIGMA_PRIOR, np.ones(3), 0.0)
 
 
 def test_plans_and_networks_of_plans_are_refused(predictor):
     grid = Grid((8, 7, 1), 0.4)
     with pytest.raises(SettingError, match="several layers of voxels"):
-        predictor.predict(grid, *drawn_belief(grid.shape, 1)[:2], SIGMA_PRIOR, np.ones(3))
+        predictor.predict(grid, *drawn_belief(grid.shape, 1)[:2], SIGMA_PRIOR, np.ones(3), 0.0)
     with pytest.raises(SettingError, match=r"first\.0 .* networks for crops of 32 layers"):
         VolumePredictor(shipped_predictor().network)
     with pytest.raises(SettingError, match=r"first\.0 .* networks for crops of 1 layer"):

@@ -50,7 +50,7 @@ def channels(
 def volume_channels(
     mean: np.ndarray, measured: np.ndarray, voxel: Fraction, first: tuple[int, int, int]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same of 32 layers of 64 × 64 cells of 0.4 m, and (32, 64, 64) in which nothing was measured."""
+    """Channels of 32 layers of 64 × 64 cells of 0.4 m, and which of the cells hold no measured voxel."""
     cells, unknown = np.zeros((65, 64, 64)), np.zeros((32, 64, 64), bool)
     spans = [
         [overlapped(start + n, voxel, count, 2 * CELL) for n in range(cells_along)]

@@ -21,18 +21,19 @@ from entropy_explore_env.prediction.volumes import VOLUMES, VolumeWindow
 from entropy_explore_env.prediction.weights import read_network
 from training import map_predictor, map_samples
 from training.checkpoints import stored_arrays, stored_bytes
-from training.map_predictor import Args, drawn_batch, main, masked_loss, rate_at, run_command
+from training.map_predictor import Args, main, masked_loss, rate_at, run_command
 from training.map_samples import (
     RECIPES,
     Sampled,
     Samples,
-    as_plans,
+    drawn_batch,
     read_samples,
     sampled_missions,
     scenario_of,
     unmeasured,
 )
 from training.map_scores import (
+    as_plans,
     calibration_error,
     figures_of,
     log_loss_bits,
